@@ -2,11 +2,14 @@
 #include "rt/node.hpp"
 
 #include <algorithm>
+#include <cstdarg>
+#include <cstdio>
 #include <exception>
 #include <utility>
 
 #include "rt/msg/node_state.hpp"
 #include "rt/msg/requests.hpp"
+#include "rt/sched/node_log.hpp"
 #include "rt/trace/rings.hpp"
 
 namespace takt {
@@ -24,6 +27,20 @@ int64_t Job::answer(Question question, int64_t value) const {
   if (recorded_ != nullptr) return recorded_->next(question);
   note_answer(question, value, static_cast<uint32_t>(index_));
   return value;
+}
+
+void Job::log(LogLevel level, const char* format, ...) {
+  if (log_ == nullptr) return;
+  LogLine line;
+  line.at_ns = clock_->now_ns();
+  if (!log_->admits(level, line.at_ns)) return;
+  line.job = index_;
+  line.level = level;
+  va_list values;
+  va_start(values, format);
+  std::vsnprintf(line.text.characters.data(), line.text.characters.size(), format, values);
+  va_end(values);
+  log_->append(line);
 }
 
 InputPort::InputPort(Node* owner, std::string_view name, const MessageType& type, std::string_view doc, Need need)

@@ -5,6 +5,7 @@
 
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/sanitized.hpp"
+#include "rt/sched/node_log.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::test {
@@ -90,6 +91,16 @@ void set_up(Node& node, const std::filesystem::path& output) {
   node.setup(setup);
   node.end_setup();
 }
+
+struct NodeRun::Log {
+  NodeLog log;
+  LogWriter writer{log};
+  LogReader reader;
+  std::vector<LogLine> lines;
+};
+
+NodeRun::NodeRun(std::unique_ptr<Node> node) : node_(std::move(node)), log_(std::make_unique<Log>()) {}
+NodeRun::~NodeRun() = default;
 
 void NodeRun::before_start(std::string_view what) const {
   if (started_) throw std::logic_error(std::string(what) + ": only before the node is set up");
@@ -201,6 +212,7 @@ bool NodeRun::run_at(int64_t release_ns) {
   for (const auto& output : outputs_) output->clear();
   const int64_t to_deadline = deadline_ns_ > 0 ? deadline_ns_ : rate_.period_ns();
   job_.emplace(clock_, index_++, release_ns, release_ns + to_deadline, level_, mode_);
+  job_->log_to(log_->writer);
   calls_.fill(0);
   JobCalls calls;
   calls.job = job_->index();
@@ -213,6 +225,8 @@ bool NodeRun::run_at(int64_t release_ns) {
     node_->run(*job_);
   }
   allocations_ = (thread_memory_use() - before).allocations;
+  log_->lines.clear();
+  log_->reader.take(log_->log, [&](const LogLine& line) { log_->lines.push_back(line); });
   return !job_->without_result();
 }
 
@@ -231,6 +245,8 @@ const Job& NodeRun::job() const {
   if (!job_) throw std::logic_error("no job has run yet");
   return *job_;
 }
+
+std::vector<LogLine> NodeRun::log() const { return log_->lines; }
 
 uint64_t NodeRun::allocations() const {
   require_counter(counting_allocations());

@@ -26,6 +26,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rt/log_line.hpp"
 #include "rt/memory/job_calls.hpp"
 #include "rt/node.hpp"
 
@@ -116,7 +117,8 @@ class NodeRun {
   /// The instant of the first release, ns; stamps before it are older than the run.
   static constexpr int64_t kEpochNs = 1'000'000'000;
 
-  explicit NodeRun(std::unique_ptr<Node> node) : node_(std::move(node)) {}
+  explicit NodeRun(std::unique_ptr<Node> node);
+  ~NodeRun();
 
   // Before the first job, which sets the node up.
 
@@ -189,6 +191,9 @@ class NodeRun {
   int64_t stamp_ns(std::string_view output);
   /// The job itself: what it said of its results, its device, the end of its data. Throws before the first job.
   const Job& job() const;
+  /// What it said (Job::log), in its order. None is dropped before the tenth of a level, and the time between jobs
+  /// counts as in a run.
+  std::vector<LogLine> log() const;
   /// Heap blocks and mappings that it took. Throws std::logic_error if this program cannot count them because it is not
   /// linked with takt_allocation_counter; 0 under a sanitizer, which has a malloc of its own.
   uint64_t allocations() const;
@@ -236,6 +241,8 @@ class NodeRun {
   std::vector<Latched> inputs_{node_->inputs().size()};
   std::vector<std::unique_ptr<ChunkWriter>> outputs_;  ///< none before start()
   std::optional<Job> job_;
+  struct Log;
+  std::unique_ptr<Log> log_;
   uint64_t allocations_ = 0;
   std::array<uint64_t, kJobCalls> calls_{};
 };

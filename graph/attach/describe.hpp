@@ -35,8 +35,9 @@ class JobsSince {
   std::vector<uint64_t> taken_;  ///< by task
 };
 
-/// Faults, changes of mode, marks, outages, parameters that were set and files that were frozen since the last look:
-/// [{"at_s": 3.2, "kind": "fault", "node": "stereo", "text": "..."}, ...], in the order of their instants.
+/// Faults, changes of mode, marks, outages, parameters that were set, files that were frozen and what nodes said since
+/// the last look: [{"at_s": 3.2, "kind": "fault", "node": "stereo", "text": "..."}, ...], in the order of their
+/// instants; what a node said has the kind `log` and a `level`, as LogLevel names it.
 class EventsSince {
  public:
   explicit EventsSince(const Subject& subject);
@@ -50,12 +51,14 @@ class EventsSince {
   void take_outages(std::vector<Event>& all);
   void take_parameters(std::vector<Event>& all);
   void take_frozen(std::vector<Event>& all);
+  void take_logs(std::vector<Event>& all);
 
   const Subject& subject_;
   size_t faults_ = 0, modes_ = 0, marks_ = 0;
   int64_t outage_ns_ = 0;                    ///< the newest instant of an outage that was told
   std::vector<std::vector<uint32_t>> sets_;  ///< by task and parameter: values accepted so far
   std::vector<std::string> frozen_;
+  std::vector<LogReader> logs_;  ///< by task
 };
 
 }  // namespace takt::attach

@@ -19,11 +19,12 @@ constexpr size_t kKeptSentences = 64;
 struct EventsSince::Event {
   int64_t at_ns;
   const char* kind;
-  std::string node, text;
+  std::string node, text, level = {};
 };
 
 EventsSince::EventsSince(const Subject& subject) : subject_(subject) {
   for (size_t t = 0; t < subject.plan.tasks.size(); ++t) sets_.emplace_back(subject.board.param_count(t), 0);
+  logs_.resize(subject.plan.tasks.size());
 }
 
 Json EventsSince::take() {
@@ -34,14 +35,17 @@ Json EventsSince::take() {
   take_outages(all);
   take_parameters(all);
   take_frozen(all);
+  take_logs(all);
   std::stable_sort(all.begin(), all.end(), [](const Event& a, const Event& b) { return a.at_ns < b.at_ns; });
   Json events = Json::array();
   const int64_t epoch_ns = subject_.board.epoch_ns().load();
-  for (const Event& event : all)
+  for (const Event& event : all) {
     events.push_back({{"at_s", static_cast<double>(event.at_ns - epoch_ns) / 1e9},
                       {"kind", event.kind},
                       {"node", event.node},
                       {"text", event.text}});
+    if (!event.level.empty()) events.back()["level"] = event.level;
+  }
   return events;
 }
 
@@ -114,6 +118,14 @@ void EventsSince::take_frozen(std::vector<Event>& all) {
   }
   if (frozen_.size() > kKeptSentences)
     frozen_.erase(frozen_.begin(), frozen_.end() - static_cast<std::ptrdiff_t>(kKeptSentences));
+}
+
+void EventsSince::take_logs(std::vector<Event>& all) {
+  for (size_t t = 0; t < logs_.size(); ++t)
+    logs_[t].take(subject_.board.log(t), [&](const LogLine& line) {
+      all.push_back({line.at_ns, "log", subject_.plan.tasks[t].name, with_dropped(line.text.text(), line.dropped),
+                     std::string(to_string(line.level))});
+    });
 }
 
 }  // namespace takt::attach

@@ -21,8 +21,8 @@ class CdrEncoding final : public ExportEncoding {
     if (!form) return tl::make_unexpected(form.error());
     return with_definition(std::move(*form), type);
   }
-  ExportForm log(int64_t at_ns, std::string_view name, std::string_view text) const override {
-    return with_definition(world::log_form(at_ns, name, text), {});
+  ExportForm log(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level) const override {
+    return with_definition(world::log_form(at_ns, name, text, level), {});
   }
 
  private:

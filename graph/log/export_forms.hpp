@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "rt/log_line.hpp"
 #include "rt/msg/field.hpp"
 
 namespace takt::log {
@@ -45,7 +46,7 @@ class ExportEncoding {
   /// A packed message by its fields. Error: it is cut off or too long.
   virtual tl::expected<ExportForm, std::string> by_fields(const FieldsOf& type, std::span<const std::byte> packed,
                                                           int64_t stamp_ns) const = 0;
-  virtual ExportForm log(int64_t at_ns, std::string_view name, std::string_view text) const = 0;
+  virtual ExportForm log(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level) const = 0;
 };
 
 const ExportEncoding& json_encoding();

@@ -98,8 +98,10 @@ class Export {
       record::MessageRecord at;
       at.sequence = i;
       at.stamp_ns = at.published_ns = event.at_ns;
-      write(encoding_.log(event.at_ns, event_node(event, plan), event_text(event, plan)), record::Recorder::kEvents,
-            at);
+      const auto* const said = std::get_if<record::LogSaid>(&event.what);
+      const LogLevel level = said != nullptr ? static_cast<LogLevel>(said->level) : LogLevel::info;
+      write(encoding_.log(event.at_ns, event_node(event, plan), event_text(event, plan), level),
+            record::Recorder::kEvents, at);
     }
   }
 

@@ -142,8 +142,8 @@ class JsonEncoding final : public ExportEncoding {
     const std::string name = "takt." + std::string(type.type_name);
     return ExportForm{"", name, [type, name] { return own_schema(type, name); }, text_bytes(*json)};
   }
-  ExportForm log(int64_t at_ns, std::string_view name, std::string_view text) const override {
-    return form_of("", world::Log{world::time_of(at_ns), world::kInfo, text, name, "", 0});
+  ExportForm log(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level) const override {
+    return form_of("", world::Log{world::time_of(at_ns), world::number_of(level), text, name, "", 0});
   }
 };
 

@@ -101,6 +101,9 @@ std::string event_text(const record::RecordedEvent& event, const Json& plan) {
     return fmt::format("mode {}: {}", name_at(plan.value("modes", Json::array()), change->mode), change->reason);
   if (const auto* mark = std::get_if<record::MarkSet>(&event.what))
     return fmt::format("mark: {}{}{}", mark->words, mark->who.empty() ? "" : " by ", mark->who);
+  if (const auto* said = std::get_if<record::LogSaid>(&event.what))
+    return fmt::format("{}: {}", to_string(static_cast<LogLevel>(said->level)),
+                       with_dropped(said->text, said->dropped));
   return record::name_of(event.kind);
 }
 

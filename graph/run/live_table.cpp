@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include "rt/capability.hpp"
 
@@ -35,7 +36,11 @@ double ms(const std::atomic<int64_t>& ns) { return static_cast<double>(ns.load(s
 }  // namespace
 
 LiveTable::LiveTable(const Plan& plan, const RunBoard& board, std::string title)
-    : plan_(plan), board_(board), title_(std::move(title)), thread_([this] {
+    : plan_(plan),
+      board_(board),
+      title_(std::move(title)),
+      said_(plan, board, in_journal(STDERR_FILENO)),
+      thread_([this] {
         keep_rights(Rights::none);
         show();
       }) {}
@@ -51,11 +56,26 @@ void LiveTable::show() {
   const int ticks = redraw ? 5 : 50;
   for (int tick = 1; ended_.load() == 0; ++tick) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    if (tick % ticks != 0) continue;
+    const bool said = print_said();
+    if (tick % ticks != 0 && !(said && redraw)) continue;
     if (redraw) draw_table(terminal_size().ws_col, terminal_size().ws_row);
     else print_line();
   }
-  if (drawn_lines_ > 0) std::fprintf(stderr, "\x1b[%dA\x1b[J", drawn_lines_);
+  clear_table();
+  print_said();
+}
+
+void LiveTable::clear_table() {
+  if (const int lines = std::exchange(drawn_lines_, 0); lines > 0) std::fprintf(stderr, "\x1b[%dA\x1b[J", lines);
+}
+
+/// Where the table stood; true if there was something to say.
+bool LiveTable::print_said() {
+  const std::vector<std::string> lines = said_.take();
+  if (lines.empty()) return false;
+  clear_table();
+  for (const std::string& line : lines) std::fprintf(stderr, "%s\n", line.c_str());
+  return true;
 }
 
 void LiveTable::draw_table(int columns, int rows) {

@@ -97,6 +97,7 @@ Json node_json(const RunFacts& facts, const ProofReport& proofs, size_t t) {
            {"no_result", &s.no_result}})
     node[key] = counter->load();
   node["paused"] = paused;
+  node["log"] = {{"lines", facts.board.log(t).size()}, {"dropped", facts.board.log(t).dropped()}};
   node["enforcement_error_us"] =
       s.demoted.load() > 0 ? Json(static_cast<double>(s.enforcement_error_ns.load()) / 1e3) : Json(nullptr);
   node["drift_us"] = s.drift_us();

@@ -206,8 +206,9 @@ class FoxgloveSession final : public Session {
   void send_event(uint32_t subscription, const Json& event) {
     const Json at = event.value("at_s", Json());
     const int64_t at_ns = at.is_number() ? static_cast<int64_t>(at.get<double>() * 1e9) : 0;
-    const world::Form form =
-        world::log_form(at_ns, event.value("node", ""), event.value("kind", "") + ": " + event.value("text", ""));
+    const std::string level = event.value("level", ""), kind = level.empty() ? event.value("kind", "") : level;
+    const world::Form form = world::log_form(at_ns, event.value("node", ""), kind + ": " + event.value("text", ""),
+                                             log_level(level).value_or(LogLevel::info));
     send(frame_of(
              message_data(subscription, at_ns, {reinterpret_cast<const char*>(form.bytes.data()), form.bytes.size()})),
          true);

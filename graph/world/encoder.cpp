@@ -110,8 +110,7 @@ tl::expected<Form, std::string> own_form(std::string_view type_name, std::span<c
 }
 
 Form log_form(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level) {
-  return {"", full_name(Log::schema_name),
-          encoded(Log{time_of(at_ns), static_cast<uint8_t>(level), text, name, "", 0})};
+  return {"", full_name(Log::schema_name), encoded(Log{time_of(at_ns), number_of(level), text, name, "", 0})};
 }
 
 std::string topic_of(std::string_view port, std::string_view form_topic) {

@@ -25,6 +25,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "rt/log_line.hpp"
 #include "rt/msg/field.hpp"
 
 namespace takt::world {
@@ -71,8 +72,6 @@ Form own_form(const MessageType& type, const void* message, int64_t stamp_ns);
 /// The same of a message as a record holds it (rt/record/packed_message.hpp). Error: it is cut off or too long.
 tl::expected<Form, std::string> own_form(std::string_view type_name, std::span<const Field> fields,
                                          std::span<const std::byte> packed, int64_t stamp_ns);
-/// As Foxglove's schema numbers them.
-enum class LogLevel : uint8_t { debug = 1, info, warning, error, fatal };
 /// A line of a log: an event, a text. Topic "". `name`: the node that it is about.
 Form log_form(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level = LogLevel::info);
 

@@ -186,10 +186,11 @@ struct FrameTransforms {
   TAKT_SCHEMA(FrameTransforms, "foxglove_msgs/FrameTransforms", transforms)
 };
 
-constexpr uint8_t kInfo = 2;  ///< Log::level
+/// Log::level
+constexpr uint8_t number_of(LogLevel level) { return static_cast<uint8_t>(static_cast<uint8_t>(level) + 1); }
 struct Log {
   Time timestamp;
-  uint8_t level = kInfo;
+  uint8_t level = number_of(LogLevel::info);
   std::string_view message, name, file;
   uint32_t line = 0;
   TAKT_SCHEMA(Log, "foxglove_msgs/Log", timestamp, level, message, name, file, line)

@@ -89,7 +89,7 @@ class Shown final : public Viewer {
   }
   void text(std::string_view text) override {
     whole_ = true;
-    show("", "text", [&] { return Log{time_, kInfo, text, node_, "", 0}; });
+    show("", "text", [&] { return Log{time_, number_of(LogLevel::info), text, node_, "", 0}; });
   }
   void mounted(const Transform& sensor_in_robot) override {
     const Transform& t = sensor_in_robot;

@@ -53,7 +53,9 @@ class MissionNode final : public Node {
     TextStatus* status = status_.loan();
     Requests* requests = requests_.loan();
     if (!task || !wanted || !status || !requests) return job.no_result();
+    const State before = mission_->state();
     if (!odometry_.empty() && !odometry_.stale()) step(job.release_ns());
+    if (mission_->state() != before) say(job);
 
     const MissionTask told = mission_->task();
     task->number = told.number;
@@ -172,6 +174,13 @@ class MissionNode final : public Node {
   static void write(std::string_view text, Array<char>& into) {
     into.resize(text.size());
     std::copy_n(text.begin(), into.size, into.data());
+  }
+
+  void say(Job& job) const {
+    const std::string_view state = to_string(mission_->state()), trouble = mission_->trouble();
+    const std::string_view why = trouble.empty() ? mission_->task().text : trouble;
+    job.log(mission_->state() == State::failed ? LogLevel::warning : LogLevel::info, "%.*s | %.*s",
+            static_cast<int>(state.size()), state.data(), static_cast<int>(why.size()), why.data());
   }
 
   void tell(TextStatus& status) const {

@@ -37,18 +37,21 @@ struct Body {
   template <class M>
   requires std::is_same_v<std::remove_const_t<M>, MarkSet>
   void operator()(M& mark) { at.text(mark.words), at.text(mark.who); }
+  template <class L>
+  requires std::is_same_v<std::remove_const_t<L>, LogSaid>
+  void operator()(L& said) { at.number(said.level), at.number(said.dropped), at.text(said.text); }
 };
 
 }  // namespace
 
 std::string name_of(uint16_t kind) {
-  static constexpr std::array<const char*, 8> names{"restart", "parameter", "mode",         "request",
-                                                    "mark",    "snapshot",  "machine_lost", "level"};
+  static constexpr std::array<const char*, 9> names{"restart",  "parameter",    "mode",  "request", "mark",
+                                                    "snapshot", "machine_lost", "level", "log"};
   if (kind == 0 || kind > names.size()) return "unknown kind " + std::to_string(kind);
   const std::string name = names[kind - 1];
-  const bool written = kind < static_cast<uint16_t>(EventKind::request) ||
-                       kind == static_cast<uint16_t>(EventKind::mark) ||
-                       kind == static_cast<uint16_t>(EventKind::snapshot);
+  const bool written =
+      kind < static_cast<uint16_t>(EventKind::request) || kind == static_cast<uint16_t>(EventKind::mark) ||
+      kind == static_cast<uint16_t>(EventKind::snapshot) || kind == static_cast<uint16_t>(EventKind::log);
   return written ? name : "reserved kind " + std::to_string(kind) + " (" + name + ")";
 }
 
@@ -69,6 +72,7 @@ tl::expected<RecordedEvent, std::string> unpack_event(std::span<const std::byte>
       case EventKind::mode: event.what = ModeChange{}; break;
       case EventKind::mark: event.what = MarkSet{}; break;
       case EventKind::snapshot: event.what = Snapshot{}; break;
+      case EventKind::log: event.what = LogSaid{}; break;
       default: break;
     }
     std::visit(Body<PackIn>{in}, event.what);
@@ -86,6 +90,7 @@ const char* event_layout() {
          "3 mode: u32 mode, text reason; "
          "5 mark: text words, text who; "
          "6 snapshot: as 1, u64 state; "
+         "9 log: u8 level (0 debug, 1 info, 2 warning, 3 error), u32 dropped, text text; "
          "4 request, 7 machine_lost, 8 level: reserved; pass over kinds and bytes behind that you "
          "do not know; little-endian, [..] is u32 count and the elements, text is u32 bytes and the bytes";
 }

@@ -28,6 +28,7 @@ enum class EventKind : uint16_t {
   snapshot,      ///< where a replay may begin: what a task went on from, behind one of its jobs
   machine_lost,  ///< reserved: another machine of the run went away
   level,         ///< reserved: a task's quality level changes; jobs tell theirs
+  log,           ///< a node said something (Job::log)
 };
 /// "restart"; "reserved kind 4 (request)"; "unknown kind 99".
 std::string name_of(uint16_t kind);
@@ -81,13 +82,21 @@ struct MarkSet {
   bool operator==(const MarkSet&) const = default;
 };
 
+/// Its event has the job that said it.
+struct LogSaid {
+  uint8_t level = 0;     ///< LogLevel
+  uint32_t dropped = 0;  ///< lines of the node that were too many since its line before
+  std::string text;
+  bool operator==(const LogSaid&) const = default;
+};
+
 struct RecordedEvent {
   static constexpr uint16_t kNoTask = UINT16_MAX;
   uint16_t kind = 0;        ///< EventKind, or one that this program does not know
   uint16_t task = kNoTask;  ///< index into Plan::tasks
-  uint32_t job = 0;         ///< Job::index() of the job that begins next; 0 without a task
+  uint32_t job = 0;         ///< Job::index() of the job that begins next, or that said it; 0 without a task
   int64_t at_ns = 0;
-  std::variant<std::monostate, Restart, ParameterSet, ModeChange, MarkSet, Snapshot>
+  std::variant<std::monostate, Restart, ParameterSet, ModeChange, MarkSet, Snapshot, LogSaid>
       what;  ///< monostate: of a kind that is not known
   bool operator==(const RecordedEvent&) const = default;
 };

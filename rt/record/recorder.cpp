@@ -46,6 +46,7 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
   head_.facts["format"] = std::to_string(coded_.empty() ? kFormatWithoutJpeg : kFormat);
   for (size_t p = 0; p < plan.ports.size(); ++p)
     if (ports_[p].rule.keep != PortRule::nothing) ports_[p].follower.emplace(transport.make_reader(p));
+  logs_.resize(plan.tasks.size());
   for (const TaskPlan& task : plan.tasks) {
     ports_of_.push_back(task.ports);
     std::vector<size_t>& edges = edges_of_.emplace_back();
@@ -147,6 +148,7 @@ void Recorder::take_ports() {
   for (Port& port : ports_) take_port(port);
   take_modes();
   take_marks();
+  take_logs();
 }
 
 /// What stands for long is in each file, so that jobs that hold it can be run from that file alone.
@@ -170,6 +172,14 @@ void Recorder::take_marks() {
     take_event({static_cast<uint16_t>(EventKind::mark), RecordedEvent::kNoTask, 0, mark->at_ns,
                 MarkSet{std::string(mark->words.text()), "uid " + std::to_string(mark->by_user)}});
   }
+}
+
+void Recorder::take_logs() {
+  for (size_t t = 0; t < logs_.size(); ++t)
+    logs_[t].take(board_.log(t), [&](const LogLine& line) {
+      take_event({static_cast<uint16_t>(EventKind::log), static_cast<uint16_t>(t), static_cast<uint32_t>(line.job),
+                  line.at_ns, LogSaid{static_cast<uint8_t>(line.level), line.dropped, std::string(line.text.text())}});
+    });
 }
 
 void Recorder::take_modes() {

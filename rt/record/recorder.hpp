@@ -123,6 +123,7 @@ class Recorder {
   void take_event(const RecordedEvent& event);
   void take_modes();
   void take_marks();
+  void take_logs();
   void tell(size_t port, uint64_t sequence);
   void push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data);
   void capture_on();
@@ -153,7 +154,8 @@ class Recorder {
   std::vector<std::vector<size_t>> ports_of_, edges_of_;  ///< by task: ports written and read
   uint16_t jobs_channel_ = 0, events_channel_ = 0;
   size_t modes_taken_ = 0, marks_taken_ = 0;
-  size_t job_bytes_ = 0;  ///< of the last job, packed
+  std::vector<LogReader> logs_;  ///< by task
+  size_t job_bytes_ = 0;         ///< of the last job, packed
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;
   std::atomic<bool> ending_{false};

@@ -64,6 +64,7 @@ RunBoard::RunBoard(const Plan& plan, size_t processes, std::span<const size_t> p
   grants_.resize(tasks_.size());
   commits_.resize(tasks_.size());
   mail_.resize(tasks_.size());
+  logs_.resize(tasks_.size());
   sources_.resize(tasks_.size());
   source_facts_.resize(tasks_.size());
   edges_.resize(edges);
@@ -105,6 +106,7 @@ size_t RunBoard::lay_out(const Plan& plan, std::span<const size_t> process_of, s
       placer.make(tasks_, t);
       placer.make(grants_, t);
       placer.make(mail_, t);
+      placer.make(logs_, t);
       placer.make(sources_, t);
       placer.make(source_facts_, t);
       for (size_t e = first_edge_[t]; e < first_edge_[t] + plan.tasks[t].edges.size(); ++e) placer.make(edges_, e);

@@ -12,6 +12,7 @@
 #include "rt/sched/grant.hpp"
 #include "rt/sched/mark_log.hpp"
 #include "rt/sched/modes.hpp"
+#include "rt/sched/node_log.hpp"
 #include "rt/sched/outage_log.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/sched/proof_log.hpp"
@@ -151,6 +152,9 @@ class RunBoard {
   /// Of the jobs that make what a port carries; null: nobody makes it.
   CommitRing* commits_of_port(size_t p) { return producers_.find(p) == kNone ? nullptr : commits_[producers_.find(p)]; }
   ParamMail& mail(size_t t) { return *mail_[t]; }
+  /// What the node of a task says.
+  NodeLog& log(size_t t) { return *logs_[t]; }
+  const NodeLog& log(size_t t) const { return *logs_[t]; }
   size_t param_count(size_t t) const { return first_param_[t + 1] - first_param_[t]; }
   /// Parameter `param` (index into Node::params()) of a task.
   KeptParam& kept(size_t t, size_t param) { return *kept_[first_param_[t] + param]; }
@@ -254,6 +258,7 @@ class RunBoard {
   std::vector<GrantRecord*> grants_;
   std::vector<CommitRing*> commits_;
   std::vector<ParamMail*> mail_;
+  std::vector<NodeLog*> logs_;
   std::vector<CapacityRecord*> capacities_;
   std::vector<ProcessRecord*> processes_;
   std::vector<SpareSign*> spare_signs_;

@@ -50,6 +50,7 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       board_(board),
       index_(index),
       statistics_(board.task(index)),
+      log_(board.log(index)),
       commits_(board.commits(index)),
       latch_(plan_, transport, board, index, clock),
       quality_(levels_of(plan_), plan_.budget_ns, plan_.deadline_ns),
@@ -161,6 +162,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   }
   const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled_ ? nullptr : &thread_cpu_ns};
   Job job(clock_, index, release_ns, release_ns + plan_.deadline_ns, ended_.level, mode.name, cpu);
+  job.log_to(log_);
   work(job, release_ns);
   if (plan_.state_every_ns > 0) save_state();
   if (job.result_notice()) tell_notice(job);

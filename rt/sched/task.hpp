@@ -128,6 +128,7 @@ class Task {
   RunBoard& board_;
   const size_t index_;
   TaskStatistics& statistics_;
+  LogWriter log_;
   JobWatch* watch_ = nullptr;
   uint32_t member_ = 0;
   JobCalls calls_;

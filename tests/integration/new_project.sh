@@ -37,10 +37,12 @@ expect 0 "" "$takt" show my_robot.yaml
 
 # In virtual time each run is the same, and a replay of it gives the same messages.
 for copy in a b; do expect 0 "" "$takt" run my_robot.yaml --clock virtual --for 3s --record $copy.mcap; done
+grep -q "s smoother: info: begins at" "$work/stderr" || fail "the run does not print what a node says: $(cat "$work/stderr")"
 expect 0 "" "$takt" log diff a.mcap b.mcap
 expect 0 "" "$takt" replay a.mcap --compare
 grep -q "compared 60 of" "$work/stdout" "$work/stderr" || fail "replay compared: $(cat "$work/stdout")"
 expect 0 "" "$takt" log info a.mcap
+grep -q "1 log" "$work/stdout" || fail "log info does not count what nodes said: $(cat "$work/stdout")"
 grep -q my_robot_distance "$work/stdout" || fail "log info does not show the project's message"
 
 # In real time, another terminal looks on. On a machine with other work a deadline may be missed: exit 1.

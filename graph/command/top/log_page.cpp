@@ -12,8 +12,9 @@ constexpr size_t kIndent = 21;  ///< of that column
 constexpr size_t kNarrowIndent = 2;
 
 Style style_of(const EventSeen& event) {
-  if (event.kind == "fault" || event.kind == "outage") return Style::bad;
-  if (event.kind == "mode" || event.kind == "frozen") return Style::warning;
+  if (event.kind == "fault" || event.kind == "outage" || event.level == "error") return Style::bad;
+  if (event.kind == "mode" || event.kind == "frozen" || event.level == "warning") return Style::warning;
+  if (event.level == "debug") return Style::faint;
   return event.kind == "mark" ? Style::strong : Style::plain;
 }
 
@@ -25,7 +26,7 @@ Content log_page(const Watched& run, const Fit& fit) {
     page.head.push_back({{fmt::format("{} older left out", run.events_left_out), Style::faint}});
   for (const EventSeen& event : run.events) {
     const std::string text = clean(event.node.empty() ? event.text : event.node + ": " + event.text, fit.look);
-    const std::string kind = clean(event.kind, fit.look);
+    const std::string kind = clean(event.level.empty() ? event.kind : event.level, fit.look);
     const std::string words = fit.width >= kWide ? fmt::format("{:>8.1f} s {:<9} {}", event.at_s, kind, text)
                                                  : fmt::format("{:.1f} s {} {}", event.at_s, kind, text);
     for (std::string& line : wrapped(words, fit.width, fit.width >= kWide ? kIndent : kNarrowIndent))

@@ -66,7 +66,8 @@ void take_jobs(const Json& jobs, Watched& run) {
 
 void take_events(const Json& events, Watched& run) {
   for (const Json& event : events)
-    run.events.push_back({event.at("at_s"), event.at("kind"), event.value("node", ""), event.at("text")});
+    run.events.push_back(
+        {event.at("at_s"), event.at("kind"), event.value("node", ""), event.at("text"), event.value("level", "")});
   for (; run.events.size() > kMostEvents; ++run.events_left_out) run.events.pop_front();
 }
 

@@ -62,6 +62,7 @@ struct ProcessSeen {
 struct EventSeen {
   double at_s = 0;
   std::string kind, node, text;
+  std::string level = {};  ///< of kind `log`
 };
 
 struct Watched {

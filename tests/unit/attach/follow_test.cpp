@@ -196,6 +196,13 @@ TEST_CASE("events of all kinds are told once, in the order of their instants") {
   told = events.take();
   REQUIRE(told.size() == 1);
   CHECK(told[0]["text"] == "process maps is back after 0.25 s");
+  LogLine line;
+  line.at_ns = 6'000'000'000;
+  line.level = LogLevel::warning;
+  line.text = BoundedText<200>("too dark");
+  LogWriter(board.log(0)).append(line);
+  CHECK(events.take() ==
+        Json::array({{{"at_s", 5.0}, {"kind", "log"}, {"node", "map"}, {"text", "too dark"}, {"level", "warning"}}}));
   run.frozen = {"why"};
   CHECK(events.take()[0]["kind"] == "frozen");
   run.frozen.push_back("why else");

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <sched.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -172,6 +173,33 @@ TEST_CASE("A mode that was asked for too late for a job is not that of the job i
   const ReplayResult result = Replayer(again.plan, *log, {}).run();
   CHECK(result.different == 0);
   CHECK(result.compared > 20);
+}
+
+TEST_CASE("What nodes say is in the record, with node, job, level and instant, and a replay does not mind") {
+  test::TemporaryFolder folder;
+  auto sink = mcap::FileSink::open(folder.path / "run.mcap");
+  REQUIRE(sink);
+  test::SmallGraph graph;
+  graph.filter.meanwhile = [](Job& job) {
+    if (job.index() == 5) job.log(LogLevel::warning, "sum of %d jobs", 5);
+  };
+  CHECK(test::record_run(graph.plan, *sink, 1).lost() == 0);
+  auto log = LogFile::open(folder.path / "run.mcap");
+  REQUIRE(log);
+  std::vector<RecordedEvent> said;
+  for (const RecordedEvent& event : log->events())
+    if (std::holds_alternative<LogSaid>(event.what)) said.push_back(event);
+  REQUIRE(said.size() == 1);
+  CHECK(std::get<LogSaid>(said[0].what) == LogSaid{2, 0, "sum of 5 jobs"});
+  CHECK(said[0].task == 1);
+  CHECK(said[0].job == 5);
+  const auto job = std::find_if(log->jobs().begin(), log->jobs().end(),
+                                [](const RecordedJob& j) { return j.task == 1 && j.index == 5; });
+  REQUIRE(job != log->jobs().end());
+  CHECK(said[0].at_ns >= job->start_ns);
+  CHECK(said[0].at_ns <= job->published_ns);
+  test::SmallGraph again;
+  CHECK(Replayer(again.plan, *log, {}).run().different == 0);
 }
 
 TEST_CASE("Some nodes run anew, the rest comes from the record") {

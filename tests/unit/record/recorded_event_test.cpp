@@ -13,7 +13,8 @@ const std::vector<RecordedEvent>& all_known() {
       {1, 3, 70'000, 5'000, Restart{2, 0, {{0, 7, 9}, {1, 0, 0}}, {{4, 12}}, {{1, 0.5}, {3, std::string("words")}}}},
       {2, 3, 70'001, 6'000, ParameterSet{1, ParamValue(std::string("half a word")), "uid 1000"}},
       {2, 0, 1, 6'000, ParameterSet{0, ParamValue(false), ""}},
-      {3, RecordedEvent::kNoTask, 0, 7'000, ModeChange{2, "deadline missed"}}};
+      {3, RecordedEvent::kNoTask, 0, 7'000, ModeChange{2, "deadline missed"}},
+      {9, 2, 70'002, 8'000, LogSaid{2, 17, "only 3 of 8 points fit"}}};
   return events;
 }
 
@@ -43,7 +44,7 @@ TEST_CASE("An event of a known kind that ends too early is refused, wherever it 
 }
 
 TEST_CASE("Kinds that this program does not know are passed over, and named") {
-  for (const int number : {4, 7, 8, 9, 99, 65535}) {
+  for (const int number : {4, 7, 8, 10, 99, 65535}) {
     const auto kind = static_cast<uint16_t>(number);
     std::vector<std::byte> packed;
     pack(RecordedEvent{kind, 1, 2, 3, {}}, packed);
@@ -59,6 +60,7 @@ TEST_CASE("Kinds that this program does not know are passed over, and named") {
   CHECK(name_of(5) == "mark");
   CHECK(name_of(6) == "snapshot");
   CHECK(name_of(8) == "reserved kind 8 (level)");
-  CHECK(name_of(9) == "unknown kind 9");
+  CHECK(name_of(9) == "log");
+  CHECK(name_of(10) == "unknown kind 10");
   CHECK(name_of(0) == "unknown kind 0");
 }

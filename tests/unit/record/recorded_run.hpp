@@ -36,7 +36,7 @@ struct Filter final : Node {
   Param<double> gain{this, "gain", 2.0, "1", ""};
   Param<double> bias{this, "bias", 0.0, "1", ""};  ///< may be set while it runs
   double sum = 0;
-  std::function<void(const Job&)> meanwhile = {};  ///< what happens while a job is under way
+  std::function<void(Job&)> meanwhile = {};  ///< what happens while a job is under way
   void setup(Setup&) override {
     grid.reserve({4, 2, 1, 0});
     gain();
