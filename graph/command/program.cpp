@@ -15,6 +15,7 @@
 #include "graph/command/new_command.hpp"
 #include "graph/command/other_programs.hpp"
 #include "graph/command/replay_command.hpp"
+#include "graph/command/service_commands.hpp"
 #include "graph/main.hpp"
 #include "graph/plugins/plugins.hpp"
 #include "rt/abi.hpp"
@@ -56,6 +57,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   BisectOptions bisect;
   LogOptions log;
   NewOptions project;
+  ServiceOptions service;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
@@ -63,6 +65,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_bisect(app, plugins, bisect, exit_code);
   add_log(app, registry, log, exit_code);
   add_new(app, project, exit_code);
+  add_service_commands(app, service, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);
   if (argc > 1 && argv[1][0] != '-' && std::find(own.begin(), own.end(), argv[1]) == own.end())

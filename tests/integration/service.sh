@@ -3,13 +3,14 @@
 # needed) the main graph runs under `deadline` with locked memory, its threads keep no right that they do not need, its
 # group may speak to it, and SIGTERM to all ends it in order.
 source "$(dirname "$0")/lib.sh" "$@"
-unit=$source/packaging/systemd/takt.service
+unit=$work/takt@ace.service
+cp "$source/packaging/systemd/takt@.service" "$unit"
 confined=$source/tests/tools/confined.py
 
 if command -v systemd-analyze >/dev/null; then
   systemd-analyze verify --man=no "$unit" 2>"$work/verify"
   grep -v "takt is not executable" "$work/verify" && fail "the unit is not well-formed"
-  exposure=$(systemd-analyze security --offline=true "$unit" 2>&1 | sed -n 's/.*exposure level for takt.service: \([0-9.]*\) .*/\1/p')
+  exposure=$(systemd-analyze security --offline=true "$unit" 2>&1 | sed -n 's/.*exposure level for takt@ace.service: \([0-9.]*\) .*/\1/p')
   echo "systemd-analyze security: $exposure"
   awk "BEGIN {exit !(${exposure:-10} <= 2.2)}" || fail "exposure ${exposure:-unknown} instead of at most 2.2"
 else
@@ -25,6 +26,26 @@ if command -v systemd-sysusers systemd-tmpfiles >/dev/null; then
   systemd-tmpfiles --root="$work/root" --create "$(realpath "$source")/packaging/systemd/takt.tmpfiles.conf" || fail "the file for tmpfiles.d"
   [ "$(stat -c %a "$work/root/dev/cpu_dma_latency")" = 660 ] || fail "tmpfiles.d does not open cpu_dma_latency"
 fi
+
+# takt status and takt logs, with programs in place of those of systemd.
+mkdir "$work/bin"
+cat >"$work/bin/systemctl" <<'SH'
+#!/bin/sh
+[ "$1 $2" = "show takt@ace.service" ] || exit 0
+printf 'Id=takt@ace.service\nLoadState=loaded\nActiveState=active\nSubState=running\nStatusText=mode full\nNRestarts=1\nActiveEnterTimestamp=Mon 2026-11-30 08:12:01 UTC\nResult=success\n'
+SH
+printf '#!/bin/sh\necho "$@"\n' >"$work/bin/journalctl"
+chmod +x "$work/bin/systemctl" "$work/bin/journalctl"
+with_systemd() { PATH=$work/bin:$PATH "$@"; }
+expect 0 "" with_systemd "$takt" status ace
+prints "ace: active (running) since Mon 2026-11-30 08:12:01 UTC, restarted 1 time; mode full"
+expect 0 "" with_systemd "$takt" status ace --json
+prints '"restarts": 1'
+expect 3 "takt@other.service" with_systemd "$takt" status other
+expect 2 'is no name of a service' "$takt" status 'a b'
+expect 0 "" with_systemd "$takt" logs ace --since -1h --follow
+prints "--unit=takt@ace.service --output=short-iso --no-hostname --follow --since=-1h"
+expect 2 'is no name of a service' "$takt" logs 'a;b'
 
 [ "$(id -u)" = 0 ] && [ -e /usr/lib/x86_64-linux-gnu/libseccomp.so.2 ] && command -v systemd-analyze setpriv >/dev/null &&
   unshare --mount true 2>/dev/null || { echo "NOT RUN: a run under the unit's restrictions needs root, libseccomp2 and systemd-analyze"; [ $failures -eq 0 ] || exit 1; exit 77; }

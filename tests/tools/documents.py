@@ -30,7 +30,7 @@ def tell(path, line, what):
 
 # Headings of docs/faq.md that quote other programs.
 OTHERS = (
-    "systemd: takt.service: Watchdog timeout",
+    "systemd: takt@ace.service: Watchdog timeout",
     'A process hangs for up to 60 s at its start, then ends: "Timeout registering at RouDi"',
 )
 # What stands in capitals, identifiers, paths and numbers are the reader's own, and so is `...`; these words are not.
