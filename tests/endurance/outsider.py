@@ -176,4 +176,4 @@ def main():
         with Mounted(debian, (ROOT, build) if build else ()): return outsider(asked.page, debian / "root", "/root", enter, build)
 
 
-sys.exit(main())
+if __name__ == "__main__": sys.exit(main())
