@@ -17,7 +17,8 @@ constexpr const char* kFile = "libtakt_iceoryx.so";
 const IceoryxComponent* load() {
   Dl_info core{};
   dladdr(reinterpret_cast<const void*>(&version), &core);
-  const std::filesystem::path beside = std::filesystem::absolute(core.dli_fname).parent_path();
+  // The loader may have found the library through /lib, which is a link to /usr/lib: libexec is beside the latter alone.
+  const std::filesystem::path beside = std::filesystem::weakly_canonical(core.dli_fname).parent_path();
   const std::array places{beside / kFile, (beside / TAKT_LIBEXEC_FROM_LIB / kFile).lexically_normal()};
   for (const auto& file : places) {
     if (std::error_code ignored; !std::filesystem::exists(file, ignored)) continue;
