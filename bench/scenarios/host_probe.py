@@ -4,7 +4,6 @@ every 5 ms for microseconds. A deadline that is missed by less than cyclictest w
 
     probe = host_probe.start(seconds, file)   beside a run; None where cyclictest is not installed or SCHED_FIFO is refused
     host_probe.text(file, slack_ms)           afterwards: the latest wake-up, and how many were later than that
-    host_probe.excused(report, node)          jobs of a node that were later than proven while the host had the CPUs, as the run itself saw
 """
 import json, os, shutil, subprocess, sys
 
@@ -25,11 +24,6 @@ def text(file, slack_ms):
     # What is later than the histogram reaches is in the maximum only.
     latest_ms = max(thread["max"] for thread in threads) / 1000
     return f"cyclictest beside it: latest {latest_ms:.1f} ms, {over} of {sum(late.values())} later than {slack_ms} ms"
-
-
-def excused(report, node):
-    return sum(row["samples_above"] for row in report["proofs"].get("above_proof", [])
-               if row["what"] == f"response of {node}" and row["cause"] == "host_stall")
 
 
 if __name__ == "__main__":

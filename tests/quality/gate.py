@@ -123,10 +123,9 @@ def compare_ratios(bench, wanted, shard, json_file):
     for _, command, lines in sections("targets.txt"):
         targets = []
         for place, words in lines:
-            known = words[3:4] == ["known"] and len(words) == 5
-            if len(words) != 3 and not known or words[1] not in ("<=", ">="):
-                fail(f"{place}: write ROW, <= or >=, the target, and where it is known to be missed `known` and how far")
-            targets.append(ratios.Target(place, words[0], words[1], number(place, words[2]), number(place, words[4]) if known else None))
+            if len(words) != 3 or words[1] not in ("<=", ">="):
+                fail(f"{place}: write ROW, <= or >=, the target")
+            targets.append(ratios.Target(place, words[0], words[1], number(place, words[2])))
         suites.append((command, targets))
     names = [command.split()[0] for command, _ in suites]
     for name in wanted:

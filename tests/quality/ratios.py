@@ -7,7 +7,6 @@ against itself in the same run; its ratio r0 is 1 on a quiet machine.
   noise   max(r0, 1/r0); 1 for a row without a null pair
   <=      `met` if ratio <= target, `within its null pair` if ratio <= target * noise, else `FAILED`
   >=      `met` if ratio >= target, `within its null pair` if ratio >= target / noise, else `FAILED`
-  known   a target that is known to be missed: `MISSED, as known` as far as that, and told at the end
 
 With a noise above WIDEST hardly anything could fail. A row that only such a noise would excuse is `unclear`. Of a hundred
 rows that are measured once, one or two miss by chance: the suite of a row that is unclear or failed runs twice more, and
@@ -26,7 +25,7 @@ from typing import NamedTuple
 
 WIDEST = 1.5
 LONGEST_S = 900  # of a suite: several times what the longest takes on two busy CPUs
-MET, WITHIN, UNCLEAR, KNOWN, FAILED = "met", "within its null pair", "unclear", "MISSED, as known", "FAILED"
+MET, WITHIN, UNCLEAR, FAILED = "met", "within its null pair", "unclear", "FAILED"
 
 
 class Target(NamedTuple):
@@ -34,16 +33,12 @@ class Target(NamedTuple):
     pattern: str  # of row names
     sense: str  # <= or >=
     value: float
-    known: float = None  # what it is known to miss the target by, at most: from there on it fails
 
     def misses_by(self, ratio):
         """A factor: above 1 the target is missed."""
         if self.sense == "<=":
             return ratio / self.value
         return self.value / ratio if ratio > 0 else float("inf")
-
-    def is_known(self, ratio):
-        return self.known is not None and self._replace(value=self.known).misses_by(ratio) <= 1
 
 
 def is_null(row):
@@ -71,8 +66,6 @@ def judge(target, ratio, null, last=False):
     excess, noise = target.misses_by(ratio), noise_of(null)
     if excess <= 1:
         return MET
-    if target.is_known(ratio):
-        return KNOWN
     if noise > WIDEST and not last:
         return UNCLEAR if excess <= noise else FAILED
     return WITHIN if excess <= min(noise, WIDEST) else FAILED
@@ -195,12 +188,11 @@ def judge_all(bench, suites, json_file=None):
     outcomes = [judge_suite(bench, command, targets) for command, targets in suites]
     rows = [found for outcome in outcomes for found in outcome["rows"]]
     errors = sum(len(outcome["errors"]) for outcome in outcomes)
-    count = {verdict: sum(found["verdict"] == verdict for found in rows) for verdict in (MET, WITHIN, KNOWN, FAILED)}
-    print(f"ratios: {count[MET]} met, {count[WITHIN]} within their null pair, {count[KNOWN]} missed as known, "
-          f"{count[FAILED]} failed"
+    count = {verdict: sum(found["verdict"] == verdict for found in rows) for verdict in (MET, WITHIN, FAILED)}
+    print(f"ratios: {count[MET]} met, {count[WITHIN]} within their null pair, {count[FAILED]} failed"
           + (f", {errors} could not be had" if errors else ""))
     for found in rows:
-        if found["verdict"] in (KNOWN, FAILED):
+        if found["verdict"] == FAILED:
             print(text_of(found))
     if json_file:
         with open(json_file, "w", encoding="utf-8") as file:

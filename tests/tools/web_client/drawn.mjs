@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // drawn.mjs ADDRESS SECONDS: Chromium at the robot's view of takt web. Prints how many frames of each port were received and
 // drawn in that time, and the ages of the newest ones when they were drawn, as one JSON object.
-import { chromium } from "playwright-core";
+import { fresh_page } from "./browser.mjs";
 
 const [address, seconds] = process.argv.slice(2);
-const flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"];
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: flags });
-const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
+const page = await fresh_page();
 await page.goto(`${address}&view=robot`);
 await page.waitForFunction(() => Object.keys(window.takt?.drawn ?? {}).length > 0);
 await page.waitForTimeout(2000);
@@ -17,5 +15,5 @@ const after = await look();
 const since = (name) => Object.fromEntries(Object.entries(after[name]).map(([key, count]) => [key, count - (before[name][key] ?? 0)]));
 const latency_ms = await page.evaluate(() => window.takt.latency_ms.slice());
 console.log(JSON.stringify({ seconds: (after.at - before.at) / 1000, drawn: since("drawn"), received: since("received"), latency_ms }));
-await browser.close();
+await page.context().browser().close();
 process.exit(0);

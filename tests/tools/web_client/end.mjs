@@ -2,24 +2,11 @@
 // end.mjs ADDRESS PROCESS: a process of the run is killed and is seen to come back on the page of takt web; then the page
 // stops the run. Prints one JSON object: `restarts` of the process, `done`: jobs of each node that stood still before the
 // stop, as the page shows them. Exit 1 if something does not come.
-import { chromium } from "playwright-core";
+import { fresh_page, until, wait } from "./browser.mjs";
 
 const [address, name] = process.argv.slice(2);
-const wait = (ms) => new Promise((done) => setTimeout(done, ms));
 
-async function until(condition, what) {
-  for (let i = 0; i < 600; ++i) {
-    if (await condition()) return;
-    await wait(50);
-  }
-  throw new Error(`this has not come: ${what}`);
-}
-
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
-});
-const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
+const page = await fresh_page();
 await page.goto(address);
 await until(async () => !(await page.locator("[data-control=stop]").isDisabled()), "the right to change");
 await page.keyboard.press("1");
@@ -54,4 +41,4 @@ await until(async () => /The run has ended/.test(await page.locator("body").text
 const third = await counts();
 const stood = Object.keys(first).filter((node) => first[node] === second[node] && second[node] === third[node]);
 console.log(JSON.stringify({ restarts: (await seen()).restarts, done: Object.fromEntries(stood.map((node) => [node, Number(third[node].replace(/\D/g, ""))])) }));
-await browser.close();
+await page.context().browser().close();

@@ -2,26 +2,14 @@
 // page.mjs ADDRESS FOLDER [PARAM VALUE]: the page of takt web in Chromium, against a running graph. Opens each view, keeps
 // pictures of them in FOLDER, looks at a port until pictures are drawn, sets and keeps a parameter, sets a mark, changes the mode.
 // Prints one JSON object with what it saw; exit 1 on a console error, a request to elsewhere, or what does not come.
-import { chromium } from "playwright-core";
+import { fresh_page, until, wait } from "./browser.mjs";
 
 const [address, folder, param = "", value = ""] = process.argv.slice(2);
 const views = ["overview", "timeline", "robot", "devices", "parameters", "records", "log", "touch"];
-const flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"];
 const out = { views: [], troubles: [] };
-const wait = (ms) => new Promise((done) => setTimeout(done, ms));
-
-async function until(condition, what) {
-  for (let i = 0; i < 600; ++i) {
-    if (await condition()) return;
-    await wait(50);
-  }
-  throw new Error(`this has not come: ${what}`);
-}
 
 const origin = new URL(address).origin;
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: flags });
-const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
-const page = await context.newPage();
+const page = await fresh_page();
 page.on("console", (message) => message.type() === "error" && out.troubles.push(message.text()));
 page.on("pageerror", (error) => out.troubles.push(error.message));
 page.on("request", (request) => {
@@ -72,6 +60,6 @@ await until(async () => (await page.locator("[data-control=mode]").textContent()
 await page.keyboard.press("7");
 await until(async () => /seen in the page/.test(await page.locator("#panel-log").textContent()), "the mark in the log");
 out.mode = "safe_stop";
-await browser.close();
+await page.context().browser().close();
 console.log(JSON.stringify(out));
 process.exit(out.troubles.length > 0 ? 1 : 0);
