@@ -2,13 +2,11 @@
 #include "graph/command/service_commands.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "graph/cli/outcome.hpp"
@@ -71,14 +69,21 @@ int print_status(const ServiceOptions& options) {
 
 int print_logs(const ServiceOptions& options) {
   if (!sound(options.name)) return wrong_name(options.name);
-  std::vector<std::string> words{"journalctl", "--unit=" + pattern(options), "--output=short-iso", "--no-hostname"};
-  if (options.follow) words.emplace_back("--follow");
-  if (!options.since.empty()) words.push_back("--since=" + options.since);
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  execvp(arguments[0], arguments.data());
-  return refuse(fmt::format("journalctl cannot be started: {}", std::strerror(errno)), kDeviceOrSystem);
+  std::string command =
+      "exec journalctl --unit=" + flight::shell_word(pattern(options)) + " --output=short-iso --no-hostname";
+  if (options.follow) command += " --follow";
+  if (!options.since.empty()) command += " --since=" + flight::shell_word(options.since);
+  auto shell = flight::RemoteShell::here();
+  if (!shell) return refuse(shell.error(), kDeviceOrSystem);
+  shell->say(command);
+  while (const auto line = shell->line()) {
+    fmt::print("{}\n", *line);
+    // A reader that left, as `head` does, ends it; main tells what could not be written.
+    if (std::fflush(stdout) != 0) return kDeviceOrSystem;
+  }
+  if (const int code = shell->end(); code != 0)
+    return refuse(fmt::format("journalctl ended with {}", code), kDeviceOrSystem);
+  return kOk;
 }
 
 }  // namespace

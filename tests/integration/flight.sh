@@ -38,17 +38,19 @@ expect 0 "" "$takt" mark "it turned left" --run $run
 said "frozen: " "$work/marked.err"
 expect 0 "" "$takt" stop --run $run
 wait $run
-frozen=$(echo "$work"/marked/flight/frozen/*-mark.mcap)
-expect 0 "" "$takt" log info "$frozen"
-prints "obstacle_stop.stop"
-expect 0 "" "$takt" log echo "$frozen" obstacle_stop.stop
-python3 - "$work/marked.json" <<'EOF' || fail "the report's flight"
+frozen=$(python3 - "$work/marked.json" "$work/marked/flight/frozen" <<'EOF'
 import json, sys
 flight = json.load(open(sys.argv[1]))["flight"]
 assert flight["disk"]["lost"] == 0 and flight["disk"]["refused"] == "", flight["disk"]
-marks = [one for one in flight["frozen"] if one["kind"] == "mark"]
-assert len(marks) == 1 and marks[0]["what"] == "mark: it turned left" and marks[0]["refused"] == "", marks
+# A busy machine may have missed a deadline just before: the mark stands among the others of that file then.
+marks = [one for one in flight["frozen"] if "mark: it turned left" in [cause["what"] for cause in [one, *one["also"]]]]
+assert len(marks) == 1 and marks[0]["refused"] == "", flight["frozen"]
+print(f"{sys.argv[2]}/{marks[0]['file']}")
 EOF
+) || fail "the report's flight"
+expect 0 "" "$takt" log info "$frozen"
+prints "obstacle_stop.stop"
+expect 0 "" "$takt" log echo "$frozen" obstacle_stop.stop
 
 # Killed with all that belongs to it, in one process and in several.
 for isolate in none subsystem; do

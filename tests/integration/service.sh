@@ -46,6 +46,11 @@ expect 2 'is no name of a service' "$takt" status 'a b'
 expect 0 "" with_systemd "$takt" logs ace --since -1h --follow
 prints "--unit=takt@ace.service --output=short-iso --no-hostname --follow --since=-1h"
 expect 2 'is no name of a service' "$takt" logs 'a;b'
+printf '#!/bin/sh\nexec yes\n' >"$work/bin/journalctl"
+(trap - PIPE; with_systemd timeout 20 "$takt" logs --follow; echo $? >"$work/code") 2>/dev/null | head -1 >/dev/null
+[ "$(cat "$work/code")" = 3 ] || fail "logs whose reader has left ended with $(cat "$work/code")"
+printf '#!/bin/sh\nexit 5\n' >"$work/bin/journalctl"
+expect 3 "journalctl ended with 5" with_systemd "$takt" logs
 
 [ "$(id -u)" = 0 ] && [ -e /usr/lib/x86_64-linux-gnu/libseccomp.so.2 ] && command -v systemd-analyze setpriv >/dev/null &&
   unshare --mount true 2>/dev/null || { echo "NOT RUN: a run under the unit's restrictions needs root, libseccomp2 and systemd-analyze"; [ $failures -eq 0 ] || exit 1; exit 77; }
