@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "rt/time/clock.hpp"
+#include "rt/time/thread_clock.hpp"
 
 // Defined by takt_allocation_counter where a program links it, null otherwise.
 extern "C" __attribute__((weak)) uint64_t takt_thread_allocations();
@@ -30,7 +30,7 @@ thread_local ThreadUse last;
 int64_t last_thread_use_ns() { return last.cpu_ns; }
 
 ThreadUse take_thread_use() {
-  const ThreadUse now{thread_cpu_ns(), counting_allocations() ? takt_thread_allocations() : 0};
+  const ThreadUse now{thread_cpu_fast_ns(), counting_allocations() ? takt_thread_allocations() : 0};
   const ThreadUse used{now.cpu_ns - last.cpu_ns, now.allocations - last.allocations};
   last = now;
   return used;
