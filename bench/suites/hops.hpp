@@ -40,7 +40,7 @@ struct Line {
   std::atomic<uint32_t> sent{0}, answered{0};
 };
 
-inline constexpr size_t kMaxHops = 32;
+inline constexpr size_t kMaxHops = 40;
 
 struct Board {
   Line lines[kMaxHops];

@@ -28,13 +28,18 @@ constexpr int kWarmUp = 20;  // every chunk of every pool once, so that its page
 std::vector<HopPlan> contestants() {
   std::vector<HopPlan> hops{{Carrier::futex, Place::threads, 0, false},
                             {Carrier::futex, Place::threads, 0, true},
-                            {Carrier::futex, Place::processes, 0, false}};
+                            {Carrier::futex, Place::processes, 0, false},
+                            {Carrier::futex, Place::processes, 0, true}};
+  // Each reference twice, as its null pair.
+  hops.push_back({Carrier::takt, Place::threads, kSizes[0], true});
+  hops.push_back({Carrier::takt, Place::processes, kSizes[0], true});
+  hops.push_back({Carrier::takt_local, Place::processes, kSizes[0], true});
   for (uint32_t bytes : kSizes) {
     hops.push_back({Carrier::takt, Place::same_worker, bytes, false});
     hops.push_back({Carrier::takt, Place::threads, bytes, false});
     hops.push_back({Carrier::takt, Place::processes, bytes, false});
     hops.push_back({Carrier::takt_local, Place::processes, bytes, false});
-    hops.push_back({Carrier::iceoryx, Place::processes, bytes, false});
+    for (bool second : {false, true}) hops.push_back({Carrier::iceoryx, Place::processes, bytes, second});
   }
   for (const Peer& peer : peers())
     for (uint32_t bytes : kSizes)
@@ -146,22 +151,28 @@ class Table {
     const size_t threads = find(hops_, Carrier::futex, Place::threads, 0);
     const size_t processes = find(hops_, Carrier::futex, Place::processes, 0);
     compare("futex_threads_null", find(hops_, Carrier::futex, Place::threads, 0, true), threads);
+    compare("futex_processes_null", find(hops_, Carrier::futex, Place::processes, 0, true), processes);
     for (uint32_t bytes : kSizes) {
       const std::string size = std::to_string(bytes);
       const size_t across = find(hops_, Carrier::takt, Place::processes, bytes);
+      const size_t raw = find(hops_, Carrier::iceoryx, Place::processes, bytes);
       compare("same_worker_" + size, find(hops_, Carrier::takt, Place::same_worker, bytes), threads);
       compare("threads_" + size, find(hops_, Carrier::takt, Place::threads, bytes), threads);
       compare("processes_" + size, across, processes);
       compare("processes_local_" + size, find(hops_, Carrier::takt_local, Place::processes, bytes), processes);
-      compare("processes_" + size + "_to_iceoryx", across, find(hops_, Carrier::iceoryx, Place::processes, bytes));
-      compare("iceoryx_processes_" + size, find(hops_, Carrier::iceoryx, Place::processes, bytes), processes);
+      compare("processes_" + size + "_to_iceoryx", across, raw);
+      compare("iceoryx_processes_" + size, raw, processes);
+      compare("iceoryx_processes_" + size + "_null", find(hops_, Carrier::iceoryx, Place::processes, bytes, true), raw);
     }
-    compare("processes_largest_to_smallest", find(hops_, Carrier::takt, Place::processes, kSizes[2]),
-            find(hops_, Carrier::takt, Place::processes, kSizes[0]));
-    compare("processes_local_largest_to_smallest", find(hops_, Carrier::takt_local, Place::processes, kSizes[2]),
-            find(hops_, Carrier::takt_local, Place::processes, kSizes[0]));
-    compare("threads_largest_to_smallest", find(hops_, Carrier::takt, Place::threads, kSizes[2]),
-            find(hops_, Carrier::takt, Place::threads, kSizes[0]));
+    to_smallest("processes", Carrier::takt, Place::processes);
+    to_smallest("processes_local", Carrier::takt_local, Place::processes);
+    to_smallest("threads", Carrier::takt, Place::threads);
+  }
+
+  void to_smallest(const std::string& what, Carrier carrier, Place place) {
+    const size_t smallest = find(hops_, carrier, place, kSizes[0]);
+    compare(what + "_largest_to_smallest", find(hops_, carrier, place, kSizes[2]), smallest);
+    compare(what + "_smallest_null", find(hops_, carrier, place, kSizes[0], true), smallest);
   }
 
   void add_peers() {

@@ -204,9 +204,13 @@ TAKT_HOT void Task::rehearse(int64_t release_ns) const {
   for (const InputPort* input : plan_.node->inputs()) prefetch(input, kPort);
   for (const OutputPort* output : plan_.node->outputs()) prefetch(output, kPort);
   prefetch(&board_.mail(index_), sizeof(ParamMail::state));
+  prefetch(modes_.data(), sizeof(Mode));
   latch_.rehearse(release_ns);
-  // Reads the state of the pool, which a loan begins with.
-  for (const auto& writer : writers_) static_cast<void>(writer->statistics());
+  prefetch(&commits_, sizeof commits_);
+  prefetch(sequences_.data(), sizeof(uint64_t));
+  prefetch(sent_stamps_ns_.data(), sizeof(int64_t));
+  for (const size_t port : plan_.ports) prefetch(&board_.port(port).published, sizeof(uint64_t));
+  for (const auto& writer : writers_) writer->rehearse();
 }
 
 void Task::pass_over(int64_t now_ns, bool count) {

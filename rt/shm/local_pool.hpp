@@ -20,6 +20,7 @@
 #include <span>
 #include <vector>
 
+#include "rt/hot.hpp"
 #include "rt/shm/transport.hpp"
 
 namespace takt {
@@ -72,6 +73,11 @@ class LocalPool {
   /// of the message are what they were.
   void mark_end(uint32_t chunk) const;
   bool intact(uint32_t chunk) const;
+  /// Asks for what a message begins and ends with.
+  void prefetch_ends(uint32_t chunk) const {
+    prefetch(header(chunk), sizeof(MessageHeader) + kCacheLine);
+    prefetch(&canary(chunk), sizeof(Canary));
+  }
   uint64_t offset(const MessageHeader* header) const {
     return static_cast<uint64_t>(reinterpret_cast<const std::byte*>(header) - base_);
   }

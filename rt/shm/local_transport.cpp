@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "rt/hot.hpp"
 #include "rt/shm/commit_ring.hpp"
 #include "rt/shm/kill_order.hpp"
 #include "rt/shm/local_pool.hpp"
@@ -41,6 +42,7 @@ class LocalWriter final : public Writer {
         loaned_ = next_free();
       }
       if (loaned_ != kNoChunk) {
+        next_ = loaned_ + 1;
         state.loaned.store(loaned_ + 1, std::memory_order_release);
         if (in_use <= pool_.chunks() && in_use > state.peak_in_use.load(std::memory_order_relaxed))
           state.peak_in_use.store(in_use);
@@ -94,6 +96,12 @@ class LocalWriter final : public Writer {
 
   uint64_t go_on_after(uint64_t) override { return pool_.state().newest.load(); }
 
+  void rehearse() const override {
+    pool_.mark_used(used_);
+    if (const uint32_t chunk = next_free(); chunk != kNoChunk) pool_.prefetch_ends(chunk);
+    prefetch(&pool_.slot(pool_.state().newest.load(std::memory_order_relaxed) + 1), sizeof(PoolSlot));
+  }
+
   WriterStatistics statistics() const override {
     WriterStatistics s;
     s.sent = pool_.state().newest.load(std::memory_order_acquire);
@@ -125,12 +133,10 @@ class LocalWriter final : public Writer {
   }
 
   /// The next chunk that is not marked as used, in turn.
-  uint32_t next_free() {
+  uint32_t next_free() const {
     for (uint32_t i = 0; i < pool_.chunks(); ++i) {
       const uint32_t chunk = (next_ + i) % pool_.chunks();
-      if ((used_[chunk / 64] >> chunk % 64 & 1) != 0) continue;
-      next_ = chunk + 1;
-      return chunk;
+      if ((used_[chunk / 64] >> chunk % 64 & 1) == 0) return chunk;
     }
     return kNoChunk;
   }

@@ -85,6 +85,8 @@ class Writer {
   }
 
   virtual WriterStatistics statistics() const = 0;
+  /// Asks for the memory that the next loan and its publication will touch, without waiting for it.
+  virtual void rehearse() const { static_cast<void>(statistics()); }
   /// Before the first publication: where an earlier writer of this output, which died, came to. `noted` is what others
   /// noted of that, for back ends that do not know better.
   virtual uint64_t go_on_after(uint64_t noted) { return noted; }
