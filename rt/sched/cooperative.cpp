@@ -41,20 +41,26 @@ int64_t CooperativeQueue::next_uncovered_release_ns() {
 
 void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation) {
   wakes_.push_back(until_ns);
+  const Entry* awaited = released_at(until_ns);
   lock.unlock();
   // Nobody need be woken: who finishes a lane sleeps for its next release himself.
   const bool early = anticipation.sleep_before(until_ns, clock_, stop_);
+  if (!early && awaited != nullptr) awaited->lane->ask_for();
   lock.lock();
   wakes_.erase(std::find(wakes_.begin(), wakes_.end(), until_ns));
   if (early) stay_awake(lock, until_ns, anticipation);
 }
 
+CooperativeQueue::Entry* CooperativeQueue::released_at(int64_t instant_ns) {
+  for (Entry& entry : entries_)
+    if (!entry.busy && entry.lane->next_release_ns() == instant_ns) return &entry;
+  return nullptr;
+}
+
 void CooperativeQueue::stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation) {
-  const auto next = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
-    return !entry.busy && entry.lane->next_release_ns() == until_ns;
-  });
-  if (next == entries_.end()) return;  // the end of the run
-  next->busy = true;                   // nobody else runs it before its release anyway
+  Entry* next = released_at(until_ns);
+  if (next == nullptr) return;  // the end of the run
+  next->busy = true;            // nobody else runs it before its release anyway
   lock.unlock();
   next->lane->rehearse();
   anticipation.stay_awake_until(until_ns, clock_);

@@ -33,6 +33,8 @@ class CooperativeQueue {
   int64_t next_release_ns() const;
   /// First release for which no sleeping thread wakes in time; the end if there is none.
   int64_t next_uncovered_release_ns();
+  /// The lane that rests until then; null if there is none.
+  Entry* released_at(int64_t instant_ns);
   void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation);
   /// The rest of the way to that release, awake, with a lane that is then to run.
   void stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation);

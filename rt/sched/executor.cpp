@@ -210,6 +210,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
         const int64_t release_ns = lane.next_release_ns();
         lane.watch().falls_asleep();
         const bool early = anticipation.sleep_before(release_ns, clock_, stop_);
+        if (!early) lane.ask_for();
         lane.watch().awakes();
         if (early) {
           lane.rehearse();

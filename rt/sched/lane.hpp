@@ -31,6 +31,8 @@ class Lane {
   /// Has at hand what the next pass will need: a job comes to caches that others have filled since the last one. Only
   /// reads, and only while no job of the lane runs.
   void rehearse() const;
+  /// Where there is no time for that: asks for what the head will touch first, and waits for none of it. Any thread.
+  void ask_for() const { head().ask_for(); }
   /// In virtual time, job by job: the member to run, and its release.
   struct Activation {
     size_t member = 0;

@@ -196,15 +196,19 @@ TAKT_HOT JobEnd Task::finish(int modelled_cpu) {
   return end;
 }
 
-TAKT_HOT void Task::rehearse(int64_t release_ns) const {
+TAKT_HOT void Task::ask_for() const {
   constexpr size_t kCounters = 512, kNode = 256, kPort = 128;  // bytes that every job touches
   prefetch(this, sizeof *this);
   prefetch(&statistics_, kCounters);
   prefetch(plan_.node, kNode);
-  for (const InputPort* input : plan_.node->inputs()) prefetch(input, kPort);
-  for (const OutputPort* output : plan_.node->outputs()) prefetch(output, kPort);
   prefetch(&board_.mail(index_), sizeof(ParamMail::state));
   prefetch(modes_.data(), sizeof(Mode));
+  for (const InputPort* input : plan_.node->inputs()) prefetch(input, kPort);
+  for (const OutputPort* output : plan_.node->outputs()) prefetch(output, kPort);
+}
+
+TAKT_HOT void Task::rehearse(int64_t release_ns) const {
+  ask_for();
   latch_.rehearse(release_ns);
   prefetch(&commits_, sizeof commits_);
   prefetch(sequences_.data(), sizeof(uint64_t));
