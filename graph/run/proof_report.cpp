@@ -163,7 +163,9 @@ std::vector<ProofReport::Row> ProofReport::rows_of(const std::vector<Excess>& sa
     ++row.samples;
     row.of = kept_of(sample).samples.count();
     if (sample.observed_ns > row.largest.observed_ns) row.largest = sample;
-    row.stall_ns = std::max(row.stall_ns, away_ns(facts_.stalls.stalls(), begin_ns(sample), sample.at_ns));
+    const int64_t stall_ns = away_ns(facts_.stalls.stalls(), begin_ns(sample), sample.at_ns);
+    row.stall_ns = std::max(row.stall_ns, stall_ns);
+    row.without_stalls_ns = std::max(row.without_stalls_ns, sample.observed_ns - stall_ns);
   }
   std::vector<Row> result;
   for (auto& [cause, row] : rows) result.push_back(row);
@@ -345,6 +347,7 @@ Json ProofReport::json() const {
                {"of", row.of},
                {"cause", to_string(row.cause)},
                {"stall_ms", to_ms(row.stall_ns)},
+               {"without_stalls_ms", to_ms(row.without_stalls_ns)},
                {"at_s", static_cast<double>(row.largest.at_ns - facts_.result.epoch_ns) / 1e9}};
     if (row.chance > 0) entry["chance"] = row.chance;
     json["above_proof"].push_back(std::move(entry));
