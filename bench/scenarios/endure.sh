@@ -48,7 +48,7 @@ kinds = [  # {t}: when it begins; {u}: three seconds later, {v}: eight, since a 
 known = json.load(open(f"{root}/graph/schema/faults.schema.json"))["definitions"]["fault"]["properties"]["kind"]["enum"]
 if lacking := [kind for kind in known if not any(f"kind: {kind}," in line for line in kinds)]: sys.exit(f"endure.sh has no fault of these kinds: {lacking}")
 chance.shuffle(kinds)
-# The first one, and so long that as much waits as may (128 MB): the recorder keeps that memory, which is judged behind it.
+# The first one, and so long that as much waits as may (128 MB): memory is judged behind it.
 kinds.sort(key=lambda line: "slow_disk" not in line)
 with tempfile.TemporaryDirectory(prefix="endure-") as work:
     with open(f"{work}/scenario.yaml", "w") as f:
