@@ -62,8 +62,8 @@ void close_round(Measured& out, std::vector<Samples>& round) {
   }
 }
 
-/// Everybody at 15 Hz in turns, or each at 1 kHz for a block. The turns are in another order each time: who came always
-/// after one that wakes nobody would find the kernel's code for that cold.
+/// Everybody at 15 Hz in turns, or each at 1 kHz for a block. The order of the turns is random: a
+/// contestant that always followed one without a wake-up would find the kernel's code for it cold.
 struct Pass {
   std::vector<size_t> hops;
   bool slow = true;

@@ -61,8 +61,7 @@ class ProofReport {
     Excess largest;
     ExcessCause cause = ExcessCause::unexplained;
     int64_t bound_ns = 0, stall_ns = 0;
-    int64_t without_stalls_ns =
-        0;  ///< the largest of the kept samples, each less the time that the machine was away in it
+    int64_t without_stalls_ns = 0;  ///< the largest kept sample, each less the stalls within it
     uint64_t samples = 0, of = 0;
     double chance = 0;  ///< that so many or more are above a 99th percentile
   };

@@ -45,7 +45,7 @@ void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_n
   lock.unlock();
   // Nobody need be woken: who finishes a lane sleeps for its next release himself.
   const bool early = anticipation.sleep_before(until_ns, clock_, stop_);
-  if (!early && awaited != nullptr) awaited->lane->ask_for();
+  if (!early && awaited != nullptr) awaited->lane->fetch_ahead();
   lock.lock();
   wakes_.erase(std::find(wakes_.begin(), wakes_.end(), until_ns));
   if (early) stay_awake(lock, until_ns, anticipation);

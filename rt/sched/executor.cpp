@@ -210,11 +210,12 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
         const int64_t release_ns = lane.next_release_ns();
         lane.watch().falls_asleep();
         const bool early = anticipation.sleep_before(release_ns, clock_, stop_);
-        if (!early) lane.ask_for();
         lane.watch().awakes();
         if (early) {
           lane.rehearse();
           anticipation.stay_awake_until(release_ns, clock_);
+        } else {
+          lane.fetch_ahead();
         }
         if (lane.next_release_ns() >= stop_.end_ns()) break;
         lane.run_next(clock_, stop_);

@@ -32,7 +32,7 @@ class Lane {
   /// reads, and only while no job of the lane runs.
   void rehearse() const;
   /// Where there is no time for that: asks for what the head will touch first, and waits for none of it. Any thread.
-  void ask_for() const { head().ask_for(); }
+  void fetch_ahead() const { head().fetch_ahead(); }
   /// In virtual time, job by job: the member to run, and its release.
   struct Activation {
     size_t member = 0;

@@ -196,7 +196,7 @@ TAKT_HOT JobEnd Task::finish(int modelled_cpu) {
   return end;
 }
 
-TAKT_HOT void Task::ask_for() const {
+TAKT_HOT void Task::fetch_ahead() const {
   constexpr size_t kCounters = 512, kNode = 256, kPort = 128;  // bytes that every job touches
   prefetch(this, sizeof *this);
   prefetch(&statistics_, kCounters);
@@ -208,7 +208,7 @@ TAKT_HOT void Task::ask_for() const {
 }
 
 TAKT_HOT void Task::rehearse(int64_t release_ns) const {
-  ask_for();
+  fetch_ahead();
   latch_.rehearse(release_ns);
   prefetch(&commits_, sizeof commits_);
   prefetch(sequences_.data(), sizeof(uint64_t));

@@ -38,7 +38,7 @@ class Task {
   }
   /// Asks for what the next job will touch first, without waiting for it: the caches are others' after a sleep, and
   /// line after line a job would wait for its own. Any thread.
-  void ask_for() const;
+  void fetch_ahead() const;
   /// Looks at what the next job will look at first, so that it lies in the caches then. Before that job, on its thread.
   void rehearse(int64_t release_ns) const;
   /// Its first half: latches and works. In virtual time a job is taken to need `duration_ns` at full quality; the time

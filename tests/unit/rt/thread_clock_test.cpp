@@ -4,6 +4,8 @@
 
 #include <doctest/doctest.h>
 #include <sched.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -85,6 +87,22 @@ TEST_CASE("thread clock: what another thread takes meanwhile does not count") {
   other.join();
   REQUIRE(turns > 100);
   CHECK(off[off.size() * 9 / 10] <= 1000);
+}
+
+TEST_CASE("thread clock: begins anew in a child that was forked") {
+  while (thread_cpu_fast_ns() < 20'000'000) {
+  }
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    const int64_t begin = thread_cpu_ns(), first = thread_cpu_fast_ns();
+    while (thread_cpu_ns() < begin + 2'000'000) {
+    }
+    _exit(thread_cpu_fast_ns() >= 2'000'000 && thread_cpu_fast_ns() < first + 15'000'000 ? 0 : 1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  CHECK(status == 0);
 }
 
 TEST_CASE("thread clock: each thread has its own, and signals do no harm") {
