@@ -240,7 +240,9 @@ void Recorder::take_event(const RecordedEvent& event) {
 }
 
 void Recorder::push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data) {
-  if (!queue_.push({channel, sequence, at_ns, std::move(data)}, options_.by_caller)) no_room_.fetch_add(1);
+  if (!queue_.push({.channel = channel, .sequence = sequence, .at_ns = at_ns, .data = std::move(data)},
+                   options_.by_caller))
+    no_room_.fetch_add(1);
 }
 
 void Recorder::write_on() {
@@ -277,9 +279,9 @@ void Recorder::write(const WriteQueue::Entry& entry) {
 
 std::span<const std::byte> Recorder::as_kept(const WriteQueue::Entry& entry) {
   const auto coded = coded_.find(entry.channel);
-  if (coded == coded_.end()) return entry.data;
+  if (coded == coded_.end()) return entry.bytes();
   kept_.clear();
-  code(*coded->second.type, entry.data, coded->second.coder, kept_);
+  code(*coded->second.type, entry.bytes(), coded->second.coder, kept_);
   return kept_;
 }
 

@@ -2,12 +2,17 @@
 #include "rt/record/write_queue.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
+
+#include "rt/memory/map_as_used.hpp"
 
 namespace takt::record {
 
+void Unmap::operator()(std::byte* memory) const { munmap(memory, bytes); }
+
 std::vector<std::byte> WriteQueue::buffer(size_t expected_bytes) {
-  constexpr size_t kSmall = 4096, kStep = 64 << 10;
+  constexpr size_t kSmall = 4096, kStep = kLarge;
   // New ones of equal size, in one piece: a heap that keeps its memory would be left with holes of all sizes.
   const auto fresh = [&] {
     std::vector<std::byte> buffer;
@@ -32,11 +37,25 @@ std::vector<std::byte> WriteQueue::buffer(size_t expected_bytes) {
   return buffer;
 }
 
+bool WriteQueue::behind(size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  return bytes_ + bytes > kSpareBytes && bytes_ + bytes <= most_bytes_;
+}
+
 bool WriteQueue::push(Entry entry, bool wait) {
+  const size_t bytes = entry.data.size();
+  if (bytes >= kLarge && behind(bytes)) {
+    void* pages = map_as_used(bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS);
+    if (pages != MAP_FAILED) {
+      std::memcpy(pages, entry.data.data(), bytes);
+      entry.waited = OwnPages(static_cast<std::byte*>(pages), Unmap{bytes});
+      recycle(std::exchange(entry.data, {}));
+    }
+  }
   std::unique_lock lock(mutex_);
-  if (wait) emptied_.wait(lock, [&] { return entries_.empty() || bytes_ + entry.data.size() <= most_bytes_; });
-  if (!wait && bytes_ + entry.data.size() > most_bytes_) return false;
-  bytes_ += entry.data.size();
+  if (wait) emptied_.wait(lock, [&] { return entries_.empty() || bytes_ + bytes <= most_bytes_; });
+  if (!wait && bytes_ + bytes > most_bytes_) return false;
+  bytes_ += bytes;
   entries_.push_back(std::move(entry));
   filled_.notify_one();
   return true;
@@ -48,14 +67,14 @@ std::optional<WriteQueue::Entry> WriteQueue::pop() {
   if (entries_.empty()) return std::nullopt;
   Entry entry = std::move(entries_.front());
   entries_.pop_front();
-  bytes_ -= entry.data.size();
+  bytes_ -= entry.bytes().size();
   emptied_.notify_one();
   return entry;
 }
 
 void WriteQueue::recycle(std::vector<std::byte> buffer) {
   const std::lock_guard lock(mutex_);
-  if (spare_.size() == kBuffersKept || spare_bytes_ + buffer.capacity() > kSpareBytes) return;
+  if (buffer.capacity() == 0 || spare_.size() == kBuffersKept || spare_bytes_ + buffer.capacity() > kSpareBytes) return;
   spare_bytes_ += buffer.capacity();
   spare_.push_back(std::move(buffer));
 }

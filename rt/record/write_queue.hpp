@@ -4,20 +4,36 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace takt::record {
 
+struct Unmap {
+  size_t bytes = 0;
+  void operator()(std::byte* memory) const;
+};
+/// Memory straight from the kernel.
+using OwnPages = std::unique_ptr<std::byte, Unmap>;
+
 /// What waits to be written, bounded by its bytes: who finds no room goes on without. One thread pushes, one pops.
+/// Large messages behind a slow disk wait in pages of their own, which the kernel has back afterwards: a heap keeps all
+/// it ever had, and does not find all of it again once other threads freed it.
 class WriteQueue {
  public:
   struct Entry {
     uint16_t channel = 0;
     uint64_t sequence = 0;
     int64_t at_ns = 0;
-    std::vector<std::byte> data;
+    std::vector<std::byte> data;  ///< empty if it waited
+    OwnPages waited = {};         ///< all of it, if it waited
+
+    std::span<const std::byte> bytes() const {
+      return waited ? std::span<const std::byte>(waited.get(), waited.get_deleter().bytes) : data;
+    }
   };
 
   explicit WriteQueue(size_t most_bytes) : most_bytes_(most_bytes) {}
@@ -34,8 +50,11 @@ class WriteQueue {
   void close();
 
   static constexpr size_t kSpareBytes = 16 << 20;
+  /// Waits in pages of its own if so much, or more, waits already; smaller ones would waste most of a page.
+  static constexpr size_t kLarge = 64 << 10;
 
  private:
+  bool behind(size_t bytes);
   static constexpr size_t kBuffersKept = 64;
   const size_t most_bytes_;
   std::mutex mutex_;

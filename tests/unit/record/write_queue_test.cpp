@@ -49,3 +49,37 @@ TEST_CASE("however many messages are popped at once, no more than so much of the
   queue.recycle(std::move(job));
   CHECK(queue.buffer(kJob).data() == memory);
 }
+
+TEST_CASE("large messages that wait behind many others leave the heap, whole, and give their buffer back") {
+  WriteQueue queue(64 << 20);
+  const std::byte* memory = nullptr;
+  for (size_t i = 0; i < 32; ++i) {
+    std::vector<std::byte> image = queue.buffer(kImage);
+    memory = image.data();
+    image = filled(std::move(image), kImage);
+    image.back() = std::byte(i);
+    REQUIRE(queue.push({.sequence = i, .data = std::move(image)}, false));
+  }
+  CHECK(queue.buffer(kImage).data() == memory);
+  size_t left = 0;
+  for (size_t i = 0; i < 32; ++i) {
+    auto entry = queue.pop();
+    REQUIRE(entry);
+    CHECK(entry->sequence == i);
+    REQUIRE(entry->bytes().size() == kImage);
+    CHECK(entry->bytes().back() == std::byte(i));
+    left += entry->waited != nullptr;
+    CHECK((entry->waited == nullptr) == (entry->data.size() == kImage));
+    queue.recycle(std::move(entry->data));
+  }
+  CHECK(left == 32 - WriteQueue::kSpareBytes / kImage);
+}
+
+TEST_CASE("small messages wait in the heap, and what finds no room is lost") {
+  WriteQueue queue(WriteQueue::kSpareBytes + 10 * kJob);
+  REQUIRE(queue.push({.data = filled({}, WriteQueue::kSpareBytes)}, false));
+  REQUIRE(queue.push({.data = filled({}, kJob)}, false));
+  CHECK_FALSE(queue.push({.data = filled({}, kImage)}, false));
+  CHECK(queue.pop()->waited == nullptr);
+  CHECK(queue.pop()->waited == nullptr);
+}
