@@ -101,7 +101,8 @@ if len(outages) != len(back): bad.append("a process did not come back")
 if idle := [f"{f['kind']} {f['target']}" for f in faults if f["struck"] == 0]: bad.append(f"did not strike: {idle}")
 bad += [f"{row['what']}: expected {row['expected']}, observed {row['observed']}" for row in report["scenario"]["expectations"] if not row["met"]]
 if run.returncode not in (0, 1): bad.append(f"exit {run.returncode}")
-if not traced and late > 1.05 * early + 5: bad.append(f"memory grew from {early:.0f} to {late:.0f} MB: " + ", ".join(f"{name} {before[name]:.0f} to {after[name]:.0f}" for name in sorted(before | after)))
+if not traced and late > 1.05 * early + 5: bad.append(f"memory grew from {early:.0f} to {late:.0f} MB: " + ", ".join(
+    f"{name} {before[name]:.0f} to {after[name]:.0f} (every 10 s: {' '.join(f'{sample[name]:.0f}' for sample in samples[::2])})" for name in sorted(before | after) if after[name] > before[name] + 2))
 for what in bad: print("FAILED:", what)
 sys.exit(bool(bad))
 PY
