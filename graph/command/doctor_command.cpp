@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "graph/check/doctor_text.hpp"
-#include "graph/check/machine_file.hpp"
+#include "graph/check/figures_file.hpp"
 #include "graph/cli/outcome.hpp"
 #include "rt/machine/checks.hpp"
 #include "rt/machine/measure.hpp"
@@ -12,8 +12,18 @@
 namespace takt::command {
 namespace {
 
+/// Names of what a run under a real-time policy asks for and is refused here, with commas.
+std::string real_time_lacks(const std::vector<machine::Finding>& findings) {
+  using machine::Need;
+  std::string names;
+  for (const machine::Finding& f : findings)
+    if (f.status == machine::Status::lacks && (f.need == Need::every_run || f.need == Need::deadline))
+      names += (names.empty() ? "" : ", ") + f.name;
+  return names;
+}
+
 int run_doctor(const DoctorOptions& options) {
-  const std::filesystem::path file = graph::machine_file();
+  const std::filesystem::path file = graph::figures_file();
   if (options.measure && file.empty())
     return refuse("--measure: no place for the figures; set TAKT_MACHINE to a file, or HOME", kBadInput);
   // Before half a minute of measuring.
@@ -36,8 +46,10 @@ int run_doctor(const DoctorOptions& options) {
     if (!options.json && refused.empty()) std::printf("  written to %s for `takt check`\n", file.c_str());
   }
   if (options.json) std::printf("%s\n", json.dump(2).c_str());
-  if (refused.empty()) return kOk;
-  return refuse(file.string() + ": " + refused + "; set TAKT_MACHINE to a file that can be written", kDeviceOrSystem);
+  if (!refused.empty())
+    return refuse(file.string() + ": " + refused + "; set TAKT_MACHINE to a file that can be written", kDeviceOrSystem);
+  const std::string lacks = real_time_lacks(findings);
+  return options.require_rt && !lacks.empty() ? refuse("--require-rt: this machine lacks " + lacks, kNotOk) : kOk;
 }
 
 }  // namespace
@@ -46,6 +58,7 @@ void add_doctor(CLI::App& app, DoctorOptions& o, int& exit_code) {
   CLI::App* doctor = app.add_subcommand("doctor", "tries what Takt asks of this machine, and says what to change");
   doctor->add_flag("--measure", o.measure, "measures what the checks of a schedule charge (about 20 s)");
   doctor->add_flag("--json", o.json, "prints the result as JSON");
+  doctor->add_flag("--require-rt", o.require_rt, "exit 1 where SCHED_DEADLINE or locked memory is refused");
   doctor->footer("Example: takt doctor --measure");
   doctor->callback([&] { exit_code = run_doctor(o); });
 }

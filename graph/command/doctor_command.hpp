@@ -6,10 +6,11 @@
 namespace takt::command {
 
 struct DoctorOptions {
-  bool measure = false, json = false;
+  bool measure = false, json = false, require_rt = false;
 };
 
-/// `takt doctor`: tries what Takt asks of the machine and tells what to change. 0 if it ran, whatever it found.
+/// `takt doctor`: tries what Takt asks of the machine and tells what to change. 0 if it ran, whatever it found; with
+/// `require_rt` 1 where a run under a real-time policy would be refused.
 void add_doctor(CLI::App& app, DoctorOptions& options, int& exit_code);
 
 }  // namespace takt::command

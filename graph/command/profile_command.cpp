@@ -10,7 +10,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "graph/check/machine_file.hpp"
+#include "graph/check/figures_file.hpp"
 #include "graph/check/measured.hpp"
 #include "graph/command/profile.hpp"
 #include "graph/language/edit_schedule.hpp"

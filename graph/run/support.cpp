@@ -17,7 +17,7 @@
 #include <new>
 
 #include "graph/check/check.hpp"
-#include "graph/check/machine_file.hpp"
+#include "graph/check/figures_file.hpp"
 #include "graph/cli/boundary.hpp"
 #include "graph/run/junit.hpp"
 #include "graph/run/machine.hpp"
@@ -109,7 +109,7 @@ void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
   cores = usable;
 }
 
-graph::CheckMachine this_machine() { return graph::check_machine(machine::SystemFacts(), graph::machine_file()); }
+graph::CheckMachine this_machine() { return graph::check_machine(machine::SystemFacts(), graph::figures_file()); }
 
 tl::expected<graph::Proofs, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
                                         const graph::CheckMachine& machine, std::vector<std::string>& adjusted) {

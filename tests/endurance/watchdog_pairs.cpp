@@ -26,7 +26,7 @@
 
 #include "graph/check/admission.hpp"
 #include "graph/check/check_machine.hpp"
-#include "graph/check/machine_file.hpp"
+#include "graph/check/figures_file.hpp"
 #include "rt/machine/facts.hpp"
 #include "rt/machine/measure.hpp"
 #include "rt/memory/memory_use.hpp"
@@ -295,7 +295,7 @@ std::unique_ptr<Run> admitted_run(bool slow, const std::vector<int>& cores, cons
 
 /// Of the file that `takt doctor --measure` left, or assumed; what the watchdog costs is measured here.
 analysis::Overheads overheads_here(const machine::Facts& facts) {
-  analysis::Overheads overheads = graph::check_machine(facts, graph::machine_file()).overheads;
+  analysis::Overheads overheads = graph::check_machine(facts, graph::figures_file()).overheads;
   const auto ns = [](double us) { return static_cast<int64_t>(us * 1e3); };
   if (const auto overrun = machine::measure_watchdog_overrun()) overheads.demotion_ns = ns(overrun->max_us);
   if (const auto look = machine::measure_watchdog_look()) {

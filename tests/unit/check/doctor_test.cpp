@@ -6,14 +6,14 @@
 #include <sstream>
 
 #include "graph/check/doctor_text.hpp"
-#include "graph/check/machine_file.hpp"
+#include "graph/check/figures_file.hpp"
 #include "rt/machine/parse.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
 using graph::doctor_json;
 using graph::doctor_text;
-using graph::machine_file;
+using graph::figures_file;
 using graph::measured_json;
 using graph::measured_text;
 using graph::write_whole;
@@ -67,10 +67,10 @@ TEST_CASE("the same as JSON") {
 }
 
 TEST_CASE("where the figures of a machine go") {
-  CHECK(machine_file("/x/m.json", "/cache", "/home/a") == "/x/m.json");
-  CHECK(machine_file(nullptr, "/cache", "/home/a") == "/cache/takt/machine.json");
-  CHECK(machine_file("", "", "/home/a") == "/home/a/.cache/takt/machine.json");
-  CHECK(machine_file(nullptr, nullptr, nullptr).empty());
+  CHECK(figures_file("/x/m.json", "/cache", "/home/a") == "/x/m.json");
+  CHECK(figures_file(nullptr, "/cache", "/home/a") == "/cache/takt/machine.json");
+  CHECK(figures_file("", "", "/home/a") == "/home/a/.cache/takt/machine.json");
+  CHECK(figures_file(nullptr, nullptr, nullptr).empty());
 }
 
 TEST_CASE(

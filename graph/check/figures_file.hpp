@@ -12,9 +12,9 @@ namespace takt::graph {
 
 /// $TAKT_MACHINE, else $XDG_CACHE_HOME/takt/machine.json, else ~/.cache/takt/machine.json; an unset or empty variable
 /// is passed over. Empty if none of them is set.
-std::filesystem::path machine_file(const char* takt_machine, const char* cache_home, const char* home);
+std::filesystem::path figures_file(const char* takt_machine, const char* cache_home, const char* home);
 /// The same from the environment of this process.
-std::filesystem::path machine_file();
+std::filesystem::path figures_file();
 
 /// graph::measured_machine_json(), which `takt check` reads, with "policy" (the one that `release_us` was measured
 /// under) and "details": medians, tails and samples. Charged are the 99th percentiles of release, switch, publish and

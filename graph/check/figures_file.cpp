@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/check/machine_file.hpp"
+#include "graph/check/figures_file.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -103,15 +103,15 @@ std::string stalls_text(const machine::Stalls& s) {
 
 }  // namespace
 
-std::filesystem::path machine_file(const char* takt_machine, const char* cache_home, const char* home) {
+std::filesystem::path figures_file(const char* takt_machine, const char* cache_home, const char* home) {
   if (given(takt_machine)) return takt_machine;
   if (given(cache_home)) return std::filesystem::path(cache_home) / "takt/machine.json";
   if (given(home)) return std::filesystem::path(home) / ".cache/takt/machine.json";
   return {};
 }
 
-std::filesystem::path machine_file() {
-  return machine_file(std::getenv("TAKT_MACHINE"), std::getenv("XDG_CACHE_HOME"), std::getenv("HOME"));
+std::filesystem::path figures_file() {
+  return figures_file(std::getenv("TAKT_MACHINE"), std::getenv("XDG_CACHE_HOME"), std::getenv("HOME"));
 }
 
 Json measured_json(const machine::Identity& machine, const std::string& measured_at, const machine::Measured& m) {
