@@ -20,6 +20,7 @@ constexpr DeskCommand kDeskCommands[] = {
     {"calibrate", "measures cameras and lasers from recordings", "takt-tools"},
     {"cloud", "filters point clouds in PLY and PCD files", "takt-tools"},
     {"eval", "measures quality against ground truth", "takt-eval"},
+    {"image", "builds, tries, writes and updates machines that boot into a graph", "takt"},
     {"objects", "the database of known objects: what is in it, learning, tuning", "takt-tools"},
     {"terrain", "kinds of terrain that ground_map tells apart", "takt-tools"},
     {"train", "learns what nodes look for", "takt-tools"},

@@ -12,6 +12,7 @@
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/command/log_commands.hpp"
+#include "graph/command/machine_command.hpp"
 #include "graph/command/new_command.hpp"
 #include "graph/command/other_programs.hpp"
 #include "graph/command/replay_command.hpp"
@@ -58,6 +59,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   LogOptions log;
   NewOptions project;
   ServiceOptions service;
+  MachineOptions machine;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
@@ -66,6 +68,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_log(app, registry, log, exit_code);
   add_new(app, project, exit_code);
   add_service_commands(app, service, exit_code);
+  add_machine(app, machine, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);
   if (argc > 1 && argv[1][0] != '-' && std::find(own.begin(), own.end(), argv[1]) == own.end())

@@ -20,7 +20,8 @@ using nlohmann::json;
 const json& schema_json(Schema schema) {
   static const std::array<json, kSchemas> parsed{
       json::parse(schema_text(Schema::graph)), json::parse(schema_text(Schema::schedule)),
-      json::parse(schema_text(Schema::faults)), json::parse(schema_text(Schema::params))};
+      json::parse(schema_text(Schema::faults)), json::parse(schema_text(Schema::params)),
+      json::parse(schema_text(Schema::machine))};
   return parsed[static_cast<size_t>(schema)];
 }
 
@@ -33,7 +34,7 @@ const valijson::Schema& compiled(Schema schema) {
     return result;
   };
   static const std::array compiled{compile(Schema::graph), compile(Schema::schedule), compile(Schema::faults),
-                                   compile(Schema::params)};
+                                   compile(Schema::params), compile(Schema::machine)};
   return *compiled[static_cast<size_t>(schema)];
 }
 
@@ -189,13 +190,15 @@ class Explainer {
       words.push_back(pointer.substr(at + 1, end - at - 1));
       at = end;
     }
-    static constexpr std::array kWholes{"the graph", "the schedule", "the scenario", "the parameter file"};
+    static constexpr std::array<const char*, kSchemas> kWholes{"the graph", "the schedule", "the scenario",
+                                                               "the parameter file", "the machine file"};
     const std::string whole = kWholes[static_cast<size_t>(which_)];
     if (words.empty()) return whole;
     if (words.size() == 1) return ticked(words[0]) + " of " + whole;
     static const std::map<std::string, std::string> kinds{
-        {"devices", "device "}, {"profiles", "profile "},   {"subsystems", "subsystem "}, {"chains", "chain "},
-        {"modes", "mode "},     {"nodes", "the entry of "}, {"expect", "expectation "},   {"faults", ""}};
+        {"devices", "device "},     {"profiles", "profile "}, {"subsystems", "subsystem "},
+        {"chains", "chain "},       {"modes", "mode "},       {"nodes", "the entry of "},
+        {"expect", "expectation "}, {"faults", ""},           {"network", "interface "}};
     if (words[0] == "faults") words[1] = "faults[" + words[1] + "]";
     if (words[0] == "expect" && words[1] == "all" && words.size() > 2) {
       words[1] = "all[" + words[2] + "]";

@@ -8,8 +8,8 @@
 
 namespace takt::graph {
 
-enum class Schema : uint8_t { graph, schedule, faults, params };
-inline constexpr size_t kSchemas = 4;
+enum class Schema : uint8_t { graph, schedule, faults, params, machine };
+inline constexpr size_t kSchemas = 5;
 
 /// The schema's text as it is shipped to editors.
 std::string_view schema_text(Schema schema);
