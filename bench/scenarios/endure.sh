@@ -68,9 +68,10 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
             except (OSError, StopIteration): pass
         return found
 
-    samples = []
+    samples, end = [], time.monotonic() + seconds  # before the first process leaves: starting takes seconds, too
     while run.poll() is None:
         time.sleep(5)
+        if time.monotonic() > end: continue
         try: samples.append(resident_mb())
         except OSError: pass
     if probe: probe.wait()

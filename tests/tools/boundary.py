@@ -252,7 +252,8 @@ def call(command, places, place, path):
     for name, wants, required in places:
         if name.startswith("-") and required:
             words += [name, stand_ins[wants]]
-    at, word = {"objects add": (1, "name"), "train picture": (0, "stop"), "capture": (0, "unix:/nowhere/can")}.get(command, (0, ""))
+    at, word = {"objects add": (1, "name"), "train picture": (0, "stop"), "capture": (0, "unix:/nowhere/can"), "image update": (0, "robot"),
+                "image write": (1, "/dev/null")}.get(command, (0, ""))
     return [takt, *command.split(), *words[:at], *([word] if word else []), *words[at:]]
 
 

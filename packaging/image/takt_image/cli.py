@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line of `takt image`."""
-import argparse
 import datetime
 import os
 import pathlib
@@ -8,16 +7,9 @@ import shutil
 import sys
 import tempfile
 
-from . import base, bundle, disk, flash, graph, packages, qemu, system, tools, update
+from . import base, bundle, disk, flash, graph, packages, qemu, system, tools, update, words
 
-EXAMPLES = """
-Examples:
-  takt image keys robot_keys                                      # once: who may update
-  takt image build --graph graph/ace.yaml --machine vision_pc.yaml --keys robot_keys
-  takt image run image/takt.img                                   # try it under QEMU
-  sudo takt image write image/takt.img.xz /dev/sdX                # onto a disk
-  takt image update root@robot image/takt.raucb                   # a robot that runs an earlier one
-
+EXAMPLES = """Example: takt image build --graph graph/ace.yaml --machine vision_pc.yaml --keys robot_keys
 Exit 0: done, 1: the machine refuses or fails, 2: bad input, 3: a program or the system fails."""
 
 
@@ -114,53 +106,57 @@ def keys(options):
 
 
 def parser():
-    file, folder = pathlib.Path, pathlib.Path
-    all_ = argparse.ArgumentParser(prog="takt image", description="Builds a machine that boots into a graph; tries, writes and updates it.", epilog=EXAMPLES,
-                                   formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = all_.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    made = commands.add_parser("build", help="makes a disk and an update from a graph and a machine file")
-    made.add_argument("--graph", type=file, required=True, help="the graph that the machine runs")
-    made.add_argument("--machine", type=file, required=True, help="the machine file (docs/machine.md)")
-    made.add_argument("--keys", type=folder, help="update.key and update.pem, as `takt image keys` makes them: signs the update")
-    made.add_argument("--profile", help="the profile of the graph; without it the graph's own")
-    made.add_argument("--output", type=folder, default=folder("image"), help="where the files go (image)")
-    made.add_argument("--packages", type=folder, help="the .deb files of Takt; a checkout builds its own")
-    made.add_argument("--with-package", action="append", default=[], metavar="NAME", help="another package of Takt, such as takt-web")
-    made.add_argument("--deb", type=file, action="append", default=[], help="another .deb file, such as your own robot's")
-    made.add_argument("--files", type=folder, help="copied over the root")
-    made.add_argument("--version", help="of the release; that of the packages")
-    made.add_argument("--slot", type=int, metavar="MIB", help="size of a slot; a third more than this release needs")
-    made.add_argument("--mirror", help="a mirror of Debian")
-    made.add_argument("--fresh", action="store_true", help="makes the base again, with today's packages of Debian")
-    made.add_argument("--raw", action="store_true", help="leaves out takt.img.zst")
-    made.set_defaults(call=build)
-    ran = commands.add_parser("run", help="boots a disk under QEMU, on a copy")
-    ran.add_argument("image", type=file)
-    ran.add_argument("--uefi", action="store_true", help="UEFI instead of BIOS")
-    ran.add_argument("--memory", type=int, default=1024, metavar="MIB")
-    ran.add_argument("--keep", type=file, help="a file that keeps what the machine writes, for a next run")
-    ran.add_argument("--accel", choices=("auto", "kvm", "tcg"), default="auto")
-    ran.add_argument("--until", metavar="PATTERN", help="ends with exit 0 at the first line that has it")
-    ran.add_argument("--seconds", type=float, default=600, help="for --until (600)")
-    ran.set_defaults(call=run)
-    wrote = commands.add_parser("write", help="writes a disk onto a disk of this computer and reads it back")
-    wrote.add_argument("image", type=file)
-    wrote.add_argument("device")
-    wrote.add_argument("--yes", action="store_true", help="does not ask")
-    wrote.set_defaults(call=write)
-    sent = commands.add_parser("update", help="installs an update over SSH and waits for its self-test")
-    sent.add_argument("host")
-    sent.add_argument("bundle", type=file)
-    sent.add_argument("--ssh", default="ssh", help="the program and its options")
-    sent.set_defaults(call=send)
-    keyed = commands.add_parser("keys", help="makes a key and a certificate for updates")
-    keyed.add_argument("folder", type=folder)
-    keyed.set_defaults(call=keys)
-    return all_
+    top = words.Parser(prog="takt image", description="builds, tries, writes and updates machines that boot into a graph", epilog=EXAMPLES)
+    commands = top.add_subparsers(dest="command", required=True)
+
+    def command(name, purpose, call, example):
+        made = commands.add_parser(name, help=purpose, description=purpose, epilog=f"Example: {example}")
+        made.set_defaults(call=call)
+        return made.add_argument
+
+    add = command("build", "makes a disk and an update from a graph and a machine file", build,
+                  "takt image build --graph graph/ace.yaml --machine vision_pc.yaml --keys robot_keys")
+    add("--graph", type=words.input_file, required=True, metavar="FILE", help="the graph that the machine runs")
+    add("--machine", type=words.input_file, required=True, metavar="FILE", help="the machine file (docs/machine.md)")
+    add("--keys", type=words.input_folder, metavar="FOLDER", help="update.key and update.pem of `takt image keys`: the update is signed with them")
+    add("--profile", metavar="NAME", help="the profile of the graph (default: the graph's own)")
+    add("--output", type=words.output_folder, default=pathlib.Path("image"), metavar="NEW-FOLDER", help="where the files go (default: image)")
+    add("--packages", type=words.input_folder, metavar="FOLDER", help="the .deb files of Takt (default: a checkout builds its own)")
+    add("--with-package", action="append", default=[], metavar="NAME", help="another package of Takt, such as takt-web")
+    add("--deb", type=words.input_file, action="append", default=[], metavar="FILE", help="another .deb file, such as that of your own robot")
+    add("--files", type=words.input_folder, metavar="FOLDER", help="is copied over the root")
+    add("--version", metavar="WORD", help="of the release (default: that of the packages)")
+    add("--slot", type=int, metavar="MIB", help="size of a slot (default: a third more than this release needs)")
+    add("--mirror", metavar="URL", help="a mirror of Debian (default: that of this machine, if it is a Debian 12)")
+    add("--fresh", action="store_true", help="makes the base again, with the packages that Debian has today")
+    add("--raw", action="store_true", help="leaves out takt.img.zst")
+
+    add = command("run", "boots a disk under QEMU, on a copy", run, "takt image run image/takt.img --until 'is good'")
+    add("image", type=words.input_file, metavar="FILE", help="takt.img")
+    add("--uefi", action="store_true", help="UEFI instead of BIOS")
+    add("--memory", type=int, default=1024, metavar="MIB", help="of the machine (default: 1024)")
+    add("--keep", type=pathlib.Path, metavar="DISK", help="keeps what the machine writes, for a next run")
+    add("--accel", choices=("auto", "kvm", "tcg"), default="auto", help="KVM, or TCG, which emulates a processor (default: KVM where a guest boots with it)")
+    add("--until", metavar="PATTERN", help="ends with exit 0 at the first line of the console that has it")
+    add("--seconds", type=float, default=600, metavar="FLOAT", help="exit 1 if --until has not come by then (default: 600)")
+
+    add = command("write", "writes a disk onto one of this computer, and compares it", write, "sudo takt image write image/takt.img.zst /dev/sdX")
+    add("image", type=words.input_file, metavar="FILE", help="takt.img, plain or as .zst or .xz")
+    add("device", metavar="DEVICE", help="a whole disk that nothing uses")
+    add("--yes", action="store_true", help="does not ask")
+
+    add = command("update", "installs an update over SSH and waits for its self-test", send, "takt image update root@robot image/takt.raucb")
+    add("host", metavar="HOST", help="a machine with `ssh: keys` in its machine file")
+    add("bundle", type=words.input_file, metavar="FILE", help="takt.raucb")
+    add("--ssh", default="ssh", metavar="COMMAND", help="the program and its options (default: ssh)")
+
+    add = command("keys", "makes a key and a certificate for updates", keys, "takt image keys robot_keys")
+    add("folder", type=words.output_folder, metavar="NEW-FOLDER", help="gets update.key, which stays with you, and update.pem, which goes into images")
+    return top
 
 
-def main(words):
-    options = parser().parse_args(words)
+def main(arguments):
+    options = parser().parse_args(arguments)
     try:
         return options.call(options)
     except tools.Failure as failure:

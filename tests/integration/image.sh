@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+# takt image: bad input is refused with its name before anything begins; a disk is put together without root, twice the same, with each
+# part where GRUB and the slots expect it; only a whole disk that nothing uses is written to. tests/image boots images.
+source "$(dirname "$0")/lib.sh" "$@"
+image() { "$source/packaging/image/takt-image" "$@"; }
+export TAKT=$takt
+
+expect 2 "argument command: invalid choice: 'buidl'" image buidl
+expect 2 "none.yaml cannot be read: No such file or directory" image build --graph "$source/graph/lasers.yaml" --machine "$work/none.yaml"
+printf 'takt: 1\nmachine: robot\ncores: {count: 2, isolate: [2]}\n' >"$work/machine.yaml"
+expect 2 "machine.yaml:3:29: error: there is no CPU 2" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --output "$work/out"
+printf 'takt: 1\nmachine: robot\n' >"$work/machine.yaml"
+expect 2 "nobody could update this image: name a folder with --keys" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --output "$work/out"
+expect 2 "a graph begins with" image build --graph "$work/machine.yaml" --machine "$work/machine.yaml"
+expect 0 "" image keys "$work/keys"
+[ "$(stat -c %a "$work/keys/update.key")" = 600 ] || fail "others can read the key"
+expect 2 "is there already" image keys "$work/keys"
+mkdir "$work/debs"
+touch "$work/debs/takt_1_amd64.deb"
+expect 2 "should have one package each of takt, takt-ace; not so: takt-ace (0 files)" \
+  image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --keys "$work/keys" --packages "$work/debs" --output "$work/out"
+expect 2 "is no disk" image write "$work/machine.yaml" "$work/keys/update.pem"
+expect 2 "/dev/none: No such file or directory" image write "$work/machine.yaml" /dev/none
+
+disk() { # disk NAME: from a system that is none
+  PYTHONPATH=$source/packaging/image PYTHONDONTWRITEBYTECODE=1 SOURCE_DATE_EPOCH=1 python3 -c '
+import pathlib, sys
+from takt_image import disk, tools
+try: disk.build(pathlib.Path(sys.argv[1]), ["nohz_full=1"], pathlib.Path(sys.argv[2]), "robot/1")
+except tools.Failure as failure: sys.exit(f"NOT RUN: {failure}" if "are missing" in str(failure) else str(failure))' "$work/system.img" "$work/$1.img"
+}
+head -c 3000000 /dev/urandom >"$work/system.img"
+if disk first 2>"$work/stderr"; then
+  disk second
+  cmp "$work/first.img" "$work/second.img" || fail "two disks from one system differ"
+  cmp -n 3000000 "$work/system.img" <(tail -c +$((64 * 1048576 + 1)) "$work/first.img") || fail "slot A does not hold the system"
+  sfdisk --json "$work/first.img" | python3 -c '
+import json, sys
+parts = json.load(sys.stdin)["partitiontable"]["partitions"]
+assert [p["name"] for p in parts] == ["ESP", "system-a", "system-b", "bios", "takt-data"], parts
+assert parts[1]["start"] == 64 * 2048 and all(a["start"] % 2048 == 0 for a in parts), parts' || fail "its partitions"
+  mtype -i "$work/first.img@@2M" ::grub/machine.cfg | grep -qx 'set machine_arguments="nohz_full=1"' || fail "the kernel's words of the machine"
+  mdir -i "$work/first.img@@2M" ::EFI/BOOT | grep -q BOOTX64 || fail "nothing for UEFI"
+else
+  cat "$work/stderr"
+  grep -q "NOT RUN" "$work/stderr" || fail "no disk"
+  [ $failures -ne 0 ] || exit 77
+fi
+finish
