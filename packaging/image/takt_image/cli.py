@@ -44,7 +44,7 @@ def build(options):
     os.environ["SOURCE_DATE_EPOCH"] = packages.epoch(home())
     debs = packages.find(options.packages, home(), options.with_package) + options.deb
     release = system.Release(options.version or packages.version(debs[0]), "amd64")
-    out = options.output
+    out = options.output.resolve()
     out.mkdir(parents=True, exist_ok=True)
     root = base.build(debs, machine.packages, release.arch, options.mirror, options.fresh)
     with tempfile.TemporaryDirectory(dir=out, prefix="files-") as name:
