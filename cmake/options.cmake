@@ -23,6 +23,10 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL x86_64)
   endif()
 endif()
 add_compile_options(${TAKT_CPU_FLAGS})
+# SVE has vectors of no fixed size, which no kernel keeps in a class or array: on ARM all are compiled for NEON.
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL aarch64)
+  add_compile_definitions("HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+endif()
 
 # Contraction off: results must not depend on whether the compiler found an FMA (bit-exact replay).
 add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Werror -ffp-contract=off -fno-math-errno)

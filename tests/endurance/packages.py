@@ -31,7 +31,7 @@ STEPS = (
     (f"cd /var/lib/takt && {AS_TAKT} takt check /etc/takt/ace.yaml --policy cooperative", (0, 1)),
     (f"cd /var/lib/takt && {AS_TAKT} takt run /etc/takt/ace.yaml --policy cooperative --for 5s --output /var/lib/takt/ace", (0, 1)),
     (f"cd /var/lib/takt && {AS_TAKT} takt run /etc/takt/ace.yaml --clock virtual --for 2s --transport iceoryx --output /var/lib/takt/ace", (0,)),
-    ("takt bench --help && takt eval --help && takt objects --help && takt web --help", (0,)),
+    ("takt bench --help && takt eval --help && takt objects --help && takt web --help && takt image build --help", (0,)),
     ("python3 -c 'import takt; print(takt.__name__)'", (0,)),
     ("cd /tmp && takt new robot && cmake -S robot -B robot/build && cmake --build robot/build -j2 && ctest --test-dir robot/build", (0,)),
 )

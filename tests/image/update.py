@@ -65,6 +65,12 @@ def settled(guest):
         time.sleep(1)
 
 
+def reason(text):
+    """Of what RAUC printed, the line that says why."""
+    lines = [line for line in text.splitlines() if line.startswith("LastError")] or text.splitlines() or [""]
+    return lines[-1]
+
+
 def updated(machine, release, boots=1):
     """Installs a release from a stick, restarts, and returns what runs then, and the reason of a refusal."""
     with machine.boot(release) as guest:
@@ -74,12 +80,12 @@ def updated(machine, release, boots=1):
         if code:
             raise tools.Failure(f"install ended with {code}: {text}", tools.NOT_OK)
         since = len(guest.lines)
-        guest.ask("systemctl reboot &")
+        guest.ask("systemctl --no-block reboot")
         guest.connection = None
         guest.wait_for("takt: slot", BOOT_S, since)
         said = settled_other(guest, since)
         reason, _ = guest.ask("cat /var/lib/takt/update/refused 2>/dev/null || true")
-        guest.ask("sync; systemctl poweroff &")
+        guest.ask("sync; systemctl --no-block poweroff")
         end = time.monotonic() + 60
         while guest.process.poll() is None and time.monotonic() < end:
             guest.read(1)
@@ -118,12 +124,20 @@ class Test:
         short.write_bytes(content[:len(content) * 2 // 3])
         foreign = self.lab.build("foreign", keys=self.lab.key("foreign_keys")) / "takt.raucb"
         machine = self.machine()
+        older = self.lab.build("0") / "takt.raucb"
+        for name, file, before in (("older", older, "systemctl stop takt@lasers"), ("while the robot may move", good, "true")):
+            with machine.boot(self.lab.stick(file)) as guest:
+                was = ready(guest)
+                guest.ask(before)
+                text, code = guest.ask(INSTALL, 600)
+                self.check(code != 0 and lab.facts(guest) == was, f"{name}: refused ({reason(text)})")
+                guest.ask("sync")
         for name, file in (("damaged", damaged), ("truncated", short), ("signed by another key", foreign)):
             with machine.boot(self.lab.stick(file)) as guest:
                 before = ready(guest)
                 guest.ask(LET)
                 text, code = guest.ask(INSTALL, 600)
-                self.check(code != 0 and lab.facts(guest) == before, f"{name}: refused ({text.splitlines()[-1] if text else ''})")
+                self.check(code != 0 and lab.facts(guest) == before, f"{name}: refused ({reason(text)})")
                 guest.ask("sync")
 
     def good(self):
@@ -165,7 +179,7 @@ class Test:
             with machine.boot(stick) as guest:
                 said = ready(guest, 2)
                 kept, _ = guest.ask("cat /var/lib/takt/kept")
-                guest.ask("sync; systemctl poweroff &")
+                guest.ask("sync; systemctl --no-block poweroff")
                 guest.read(5)
             again, _ = updated(machine, stick)
             self.check(said["release"] in ("1", "2") and kept == str(n) and again["release"] == "2",

@@ -136,7 +136,7 @@ def parser():
     add("--uefi", action="store_true", help="UEFI instead of BIOS")
     add("--memory", type=int, default=1024, metavar="MIB", help="of the machine (default: 1024)")
     add("--keep", type=pathlib.Path, metavar="DISK", help="keeps what the machine writes, for a next run")
-    add("--accel", choices=("auto", "kvm", "tcg"), default="auto", help="KVM, or TCG, which emulates a processor (default: KVM where a guest boots with it)")
+    add("--accel", choices=("auto", "kvm", "tcg"), default="auto", help="KVM, or TCG, which emulates a processor (default: KVM where the processor has it)")
     add("--until", metavar="PATTERN", help="ends with exit 0 at the first line of the console that has it")
     add("--seconds", type=float, default=600, metavar="FLOAT", help="exit 1 if --until has not come by then (default: 600)")
 

@@ -11,6 +11,8 @@ from . import tools
 
 HERE = pathlib.Path(__file__).resolve().parents[1]
 UNITS = ("takt-first-boot.service", "systemd-networkd.service", "systemd-resolved.service", "systemd-timesyncd.service")
+# Of what a release leaves in /var: later ones read it, earlier ones refuse it.
+DATA_VERSION = 1
 SSHD = """# Keys only, as root, no password anywhere.
 HostKey /var/lib/takt/machine/ssh_host_ed25519_key
 AuthorizedKeysFile /etc/ssh/authorized_keys
@@ -66,6 +68,7 @@ def stage_files(folder, graph, machine, release, keyring, overlay):
     if machine.ssh_keys:
         write("etc/ssh/authorized_keys", "".join(pathlib.Path(file).read_text() for file in machine.ssh_keys))
         write("etc/ssh/sshd_config.d/60-takt.conf", SSHD)
+    write("usr/share/takt/image/data_version", f"{DATA_VERSION}\n")
     write("usr/share/takt/image/release", f"IMAGE_ID={release.compatible}\nIMAGE_VERSION={release.version}\n")
     graph.copy_to(folder)
     if overlay:

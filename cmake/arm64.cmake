@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+# Builds for 64-bit ARM on another processor (preset arm64): Debian's cross compiler, and a Debian of that architecture as sysroot, which
+# packaging/arm64/sysroot makes. Programs run under qemu-user.
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR aarch64)
+set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
+set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
+set(TAKT_SYSROOT $ENV{TAKT_SYSROOT})
+if(NOT TAKT_SYSROOT)
+  set(TAKT_SYSROOT $ENV{HOME}/.cache/takt/arm64-sysroot)
+endif()
+get_filename_component(TAKT_SYSROOT ${TAKT_SYSROOT} ABSOLUTE)
+if(NOT EXISTS ${TAKT_SYSROOT}/usr/include)
+  message(FATAL_ERROR "${TAKT_SYSROOT} is no sysroot; packaging/arm64/sysroot makes one (TAKT_SYSROOT: in another place)")
+endif()
+set(CMAKE_SYSROOT ${TAKT_SYSROOT})
+set(CMAKE_FIND_ROOT_PATH ${TAKT_SYSROOT})
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+set(ENV{PKG_CONFIG_SYSROOT_DIR} ${TAKT_SYSROOT})
+set(ENV{PKG_CONFIG_LIBDIR} ${TAKT_SYSROOT}/usr/lib/aarch64-linux-gnu/pkgconfig:${TAKT_SYSROOT}/usr/share/pkgconfig)
+set(CMAKE_CROSSCOMPILING_EMULATOR /usr/bin/qemu-aarch64-static;-L;${TAKT_SYSROOT})
+# The packages of the sysroot were unpacked and not configured, so BLAS lies where no link leads to yet.
+set(lib ${TAKT_SYSROOT}/usr/lib/aarch64-linux-gnu)
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-rpath-link,${lib}/lapack:${lib}/blas -Wl,--unresolved-symbols=ignore-in-shared-libs")
+set(CMAKE_SHARED_LINKER_FLAGS_INIT ${CMAKE_EXE_LINKER_FLAGS_INIT})
