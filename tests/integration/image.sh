@@ -2,25 +2,28 @@
 # takt image: bad input is refused with its name before anything begins; a disk is put together without root, twice the same, with each
 # part where GRUB and the slots expect it; only a whole disk that nothing uses is written to. tests/image boots images.
 source "$(dirname "$0")/lib.sh" "$@"
-image() { "$source/packaging/image/takt-image" "$@"; }
 export TAKT=$takt
+command -v openssl >/dev/null || { echo "NOT RUN: openssl is missing"; exit 77; }
 
-expect 2 "argument command: invalid choice: 'buidl'" image buidl
-expect 2 "none.yaml cannot be read: No such file or directory" image build --graph "$source/graph/lasers.yaml" --machine "$work/none.yaml"
+expect 2 "argument command: invalid choice: 'buidl'" "$takt" image buidl
+expect 2 "none.yaml cannot be read: No such file or directory" "$takt" image build --graph "$source/graph/lasers.yaml" --machine "$work/none.yaml"
 printf 'takt: 1\nmachine: robot\ncores: {count: 2, isolate: [2]}\n' >"$work/machine.yaml"
-expect 2 "machine.yaml:3:29: error: there is no CPU 2" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --output "$work/out"
+expect 2 "machine.yaml:3:29: error: there is no CPU 2" "$takt" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --output "$work/out"
 printf 'takt: 1\nmachine: robot\n' >"$work/machine.yaml"
-expect 2 "nobody could update this image: name a folder with --keys" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --output "$work/out"
-expect 2 "a graph begins with" image build --graph "$work/machine.yaml" --machine "$work/machine.yaml"
-expect 0 "" image keys "$work/keys"
+expect 2 "nobody could update this image: name a folder with --keys" "$takt" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --output "$work/out"
+expect 2 "a graph begins with" "$takt" image build --graph "$work/machine.yaml" --machine "$work/machine.yaml"
+expect 0 "" "$takt" image keys "$work/keys"
 [ "$(stat -c %a "$work/keys/update.key")" = 600 ] || fail "others can read the key"
-expect 2 "is there already" image keys "$work/keys"
+expect 2 "is there already" "$takt" image keys "$work/keys"
 mkdir "$work/debs"
 touch "$work/debs/takt_1_amd64.deb"
 expect 2 "should have one package each of takt, takt-ace; not so: takt-ace (0 files)" \
-  image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --keys "$work/keys" --packages "$work/debs" --output "$work/out"
-expect 2 "is no disk" image write "$work/machine.yaml" "$work/keys/update.pem"
-expect 2 "/dev/none: No such file or directory" image write "$work/machine.yaml" /dev/none
+  "$takt" image build --graph "$source/graph/lasers.yaml" --machine "$work/machine.yaml" --keys "$work/keys" --packages "$work/debs" --output "$work/out"
+expect 2 "is no disk" "$takt" image write "$work/machine.yaml" "$work/keys/update.pem"
+expect 2 "/dev/none: No such file or directory" "$takt" image write "$work/machine.yaml" /dev/none
+
+expect 2 "is a folder, a file is expected" "$takt" image run "$work/keys"
+expect 3 "robot: no machine made by takt image" "$takt" image update robot "$work/keys/update.pem" --ssh false
 
 disk() { # disk NAME: from a system that is none
   PYTHONPATH=$source/packaging/image PYTHONDONTWRITEBYTECODE=1 SOURCE_DATE_EPOCH=1 python3 -c '

@@ -40,9 +40,10 @@ def build(options):
         keyring.append(str(certificate))
     if not keyring:
         raise tools.Failure(f"nobody could update this image: name a folder with --keys, or `updates: {{keys: [...]}}` in {options.machine}", tools.BAD_INPUT)
+    debs = packages.find(options.packages, home(), options.with_package) if options.packages else None
     tools.need("dpkg-deb", "mmdebstrap", "zstd", "mksquashfs", "sfdisk", "mcopy", "mkfs.vfat", "grub-mkimage", *(["rauc"] if key else []))
     os.environ["SOURCE_DATE_EPOCH"] = packages.epoch(home())
-    debs = packages.find(options.packages, home(), options.with_package) + options.deb
+    debs = (debs or packages.find(None, home(), options.with_package)) + options.deb
     release = system.Release(options.version or packages.version(debs[0]), "amd64")
     out = options.output.resolve()
     out.mkdir(parents=True, exist_ok=True)
