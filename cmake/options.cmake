@@ -21,12 +21,12 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL x86_64)
   elseif(NOT TAKT_CPU STREQUAL x86-64)
     message(FATAL_ERROR "TAKT_CPU is `${TAKT_CPU}`; it must be x86-64-v2 or x86-64")
   endif()
-endif()
-add_compile_options(${TAKT_CPU_FLAGS})
-# SVE has vectors of no fixed size, which no kernel keeps in a class or array: on ARM all are compiled for NEON.
-if(CMAKE_SYSTEM_PROCESSOR STREQUAL aarch64)
+elseif(CMAKE_SYSTEM_PROCESSOR STREQUAL aarch64)
+  # What Highway calls NEON has AES. SVE has vectors of no fixed size, and kernels keep vectors in classes and arrays.
+  set(TAKT_CPU_FLAGS -march=armv8-a+crypto)
   add_compile_definitions("HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
 endif()
+add_compile_options(${TAKT_CPU_FLAGS})
 
 # Contraction off: results must not depend on whether the compiler found an FMA (bit-exact replay).
 add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Werror -ffp-contract=off -fno-math-errno)

@@ -23,7 +23,7 @@ from takt_image import qemu, tools
 
 BOOT_S, GOOD_S = 240, 420
 MOUNT = "mkdir -p /run/stick && mount -o ro /dev/vdb /run/stick"
-INSTALL = f"{MOUNT} && rauc install /run/stick/update.raucb"
+INSTALL = f"rm -f /run/takt/no_update; {MOUNT} && rauc install /run/stick/update.raucb || {{ cat /run/takt/no_update; false; }}"
 LET = "mkdir -p /run/takt && touch /run/takt/update_anyway"
 
 
@@ -67,8 +67,8 @@ def settled(guest):
 
 def reason(text):
     """Of what RAUC printed, the line that says why."""
-    lines = [line for line in text.splitlines() if line.startswith("LastError")] or text.splitlines() or [""]
-    return lines[-1]
+    lines = [line for line in text.splitlines() if "no_update" not in line] or [""]
+    return next((line for line in lines if line.startswith("LastError") and "handler" not in line), lines[-1])
 
 
 def updated(machine, release, boots=1):
@@ -170,7 +170,7 @@ class Test:
             with machine.boot(stick) as guest:
                 ready(guest)
                 guest.ask(f"{LET}; echo {n} >/var/lib/takt/kept; sync")
-                guest.ask(f"({INSTALL}; sync; systemctl reboot) >/dev/null 2>&1 &")
+                guest.ask(f"({{ {INSTALL}; }} && sync && systemctl reboot) >/dev/null 2>&1 &")
                 wait = chance.uniform(0, 150)
                 end = time.monotonic() + wait
                 while time.monotonic() < end:

@@ -33,6 +33,17 @@ try: disk.build(pathlib.Path(sys.argv[1]), ["nohz_full=1"], pathlib.Path(sys.arg
 except tools.Failure as failure: sys.exit(f"NOT RUN: {failure}" if "are missing" in str(failure) else str(failure))' "$work/system.img" "$work/$1.img"
 }
 head -c 3000000 /dev/urandom >"$work/system.img"
+truncate -s 4M "$work/large.raw"
+truncate -s 2M "$work/small.raw"
+large=$(losetup --find --show "$work/large.raw" 2>/dev/null) && small=$(losetup --find --show "$work/small.raw" 2>/dev/null) && {
+  expect 0 "written to $large and read back" "$takt" image write "$work/system.img" "$large" --yes
+  cmp -n 3000000 "$work/system.img" "$work/large.raw" || fail "the disk does not hold the image"
+  expect 2 "$small has 2 MB, the image 3" "$takt" image write "$work/system.img" "$small" --yes
+  expect 1 "nothing was written" "$takt" image write "$work/system.img" "$large" </dev/null
+  gzip -k "$work/system.img" && mv "$work/system.img.gz" "$work/system.xz"
+  expect 2 "system.xz is damaged" "$takt" image write "$work/system.xz" "$large" --yes
+} || echo "NOT RUN: losetup makes no disk here"
+for device in $large $small; do losetup --detach "$device"; done
 if disk first 2>"$work/stderr"; then
   disk second
   cmp "$work/first.img" "$work/second.img" || fail "two disks from one system differ"

@@ -26,7 +26,10 @@ def opened(image):
 
 def unpacked_bytes(image):
     if image.suffix == ".xz":
-        return int(tools.run("xz", "--robot", "--list", image).splitlines()[-1].split("\t")[4])
+        try:
+            return int(tools.run("xz", "--robot", "--list", image).splitlines()[-1].split("\t")[4])
+        except tools.Failure as failure:
+            raise tools.Failure(f"{image} is damaged: {failure}", tools.BAD_INPUT) from None
     if image.suffix == ".zst":
         process = opened(image)
         size = 0

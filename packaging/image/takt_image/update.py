@@ -37,7 +37,7 @@ def install(robot, bundle, seconds=900):
     if code:
         raise tools.Failure(f"the update could not be copied: {text}")
     with tools.step("installed"):
-        code, text = robot.ask(f"rauc install {PLACE}; code=$?; rm -f {PLACE}; exit $code", None, seconds)
+        code, text = robot.ask(f"rm -f /run/takt/no_update; rauc install {PLACE}; code=$?; rm -f {PLACE}; cat /run/takt/no_update 2>/dev/null; exit $code", None, seconds)
     if code:
         raise tools.Failure(f"the machine refuses it and goes on with release {release}:\n{text}", tools.NOT_OK)
     robot.ask("systemctl reboot")
