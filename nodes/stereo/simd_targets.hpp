@@ -3,6 +3,7 @@
 #pragma once
 // SSSE3 and AVX3_DL give these loops nothing over their neighbours; vectors of unknown length have no register arrays.
 #define TAKT_STEREO_UNUSED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_DISABLED_TARGETS  // which a build for ARM sets for all
 #ifdef TAKT_STEREO_COUNTS_ONES  // which AVX3_DL has an instruction for
 #define HWY_WANT_AVX3_DL
 #define HWY_DISABLED_TARGETS TAKT_STEREO_UNUSED_TARGETS
