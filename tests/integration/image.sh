@@ -2,7 +2,6 @@
 # takt image: bad input is refused with its name before anything begins; a disk is put together without root, twice the same, with each
 # part where GRUB and the slots expect it; only a whole disk that nothing uses is written to. tests/image boots images.
 source "$(dirname "$0")/lib.sh" "$@"
-export TAKT=$takt
 command -v openssl >/dev/null || { echo "NOT RUN: openssl is missing"; exit 77; }
 
 expect 2 "argument command: invalid choice: 'buidl'" "$takt" image buidl
@@ -23,7 +22,10 @@ expect 2 "is no disk" "$takt" image write "$work/machine.yaml" "$work/keys/updat
 expect 2 "/dev/none: No such file or directory" "$takt" image write "$work/machine.yaml" /dev/none
 
 expect 2 "is a folder, a file is expected" "$takt" image run "$work/keys"
-expect 3 "robot: no machine made by takt image" "$takt" image update robot "$work/keys/update.pem" --ssh false
+expect 2 "is no disk of" "$takt" image run "$work/machine.yaml"
+expect 2 "is no update of" "$takt" image update robot "$work/keys/update.pem"
+printf "hsqs" >"$work/update.raucb"
+expect 3 "robot: no machine made by takt image" "$takt" image update robot "$work/update.raucb" --ssh false
 
 disk() { # disk NAME: from a system that is none
   PYTHONPATH=$source/packaging/image PYTHONDONTWRITEBYTECODE=1 SOURCE_DATE_EPOCH=1 python3 -c '

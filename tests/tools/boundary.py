@@ -84,6 +84,7 @@ WHOLE = {
     "objects list": "SOURCE/graph/objects",
     "echo": "x.y",
     "robot map": "",
+    "image build": "--graph SOURCE/graph/lasers.yaml --machine SOURCE/packaging/machines/qemu.yaml",
     "bench": "semantic --rounds 1",
 }
 # Where a place wants another call than that of its command.
@@ -343,7 +344,9 @@ for command, places in commands:
     for place, wants, _ in places:
         tasks += [(try_place, command, places, place, kind, wants) for kind in chosen(KINDS[wants], 1 if command in SLOW else 2)]
     if command not in ("top", "double", "new"):  # they end when they are told to; `new` makes a folder
-        tasks += [(try_stream, command, stream) for stream in chosen(STREAMS, 1)]
+        # `web` serves until it is told to end, unless nobody can read its address.
+        streams = tuple(stream for stream in STREAMS if command != "web" or stream.startswith("stdout"))
+        tasks += [(try_stream, command, stream) for stream in chosen(streams, 1)]
 if not only:
     tasks += [(try_nested, name, graph, word, rest[0] if rest else "", kind)
               for name, graph, word, *rest in NESTED for kind in chosen(KINDS["FOLDER" if name in ("database", "signs") else "FILE"], 2)]

@@ -20,7 +20,8 @@ def home():
 
 def takt():
     """The command that reads machine files."""
-    found = os.environ.get("TAKT") or shutil.which("takt")
+    beside = pathlib.Path(sys.argv[0]).parent / "takt"
+    found = os.environ.get("TAKT") or (str(beside) if beside.is_file() else shutil.which("takt"))
     if not found:
         raise tools.Failure("the command takt is not in PATH; set TAKT to it")
     return found
@@ -117,14 +118,14 @@ def parser():
 
     add = command("build", "makes a disk and an update from a graph and a machine file", build,
                   "takt image build --graph graph/ace.yaml --machine vision_pc.yaml --keys robot_keys")
-    add("--graph", type=words.input_file, required=True, metavar="FILE", help="the graph that the machine runs")
-    add("--machine", type=words.input_file, required=True, metavar="FILE", help="the machine file (docs/machine.md)")
+    add("--graph", type=words.text_file, required=True, metavar="FILE", help="the graph that the machine runs")
+    add("--machine", type=words.text_file, required=True, metavar="FILE", help="the machine file (docs/machine.md)")
     add("--keys", type=words.input_folder, metavar="FOLDER", help="update.key and update.pem of `takt image keys`: the update is signed with them")
     add("--profile", metavar="NAME", help="the profile of the graph (default: the graph's own)")
     add("--output", type=words.output_folder, default=pathlib.Path("image"), metavar="NEW-FOLDER", help="where the files go (default: image)")
     add("--packages", type=words.input_folder, metavar="FOLDER", help="the .deb files of Takt (default: a checkout builds its own)")
     add("--with-package", action="append", default=[], metavar="NAME", help="another package of Takt, such as takt-web")
-    add("--deb", type=words.input_file, action="append", default=[], metavar="FILE", help="another .deb file, such as that of your own robot")
+    add("--deb", type=words.package, action="append", default=[], metavar="FILE", help="another .deb file, such as that of your own robot")
     add("--files", type=words.input_folder, metavar="FOLDER", help="is copied over the root")
     add("--version", metavar="WORD", help="of the release (default: that of the packages)")
     add("--slot", type=int, metavar="MIB", help="size of a slot (default: a third more than this release needs)")
@@ -133,7 +134,7 @@ def parser():
     add("--raw", action="store_true", help="leaves out takt.img.zst")
 
     add = command("run", "boots a disk under QEMU, on a copy", run, "takt image run image/takt.img --until 'is good'")
-    add("image", type=words.input_file, metavar="FILE", help="takt.img")
+    add("image", type=words.disk, metavar="FILE", help="takt.img")
     add("--uefi", action="store_true", help="UEFI instead of BIOS")
     add("--memory", type=int, default=1024, metavar="MIB", help="of the machine (default: 1024)")
     add("--keep", type=pathlib.Path, metavar="DISK", help="keeps what the machine writes, for a next run")
@@ -148,7 +149,7 @@ def parser():
 
     add = command("update", "installs an update over SSH and waits for its self-test", send, "takt image update root@robot image/takt.raucb")
     add("host", metavar="HOST", help="a machine with `ssh: keys` in its machine file")
-    add("bundle", type=words.input_file, metavar="FILE", help="takt.raucb")
+    add("bundle", type=words.bundle, metavar="FILE", help="takt.raucb")
     add("--ssh", default="ssh", metavar="COMMAND", help="the program and its options (default: ssh)")
 
     add = command("keys", "makes a key and a certificate for updates", keys, "takt image keys robot_keys")

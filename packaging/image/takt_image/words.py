@@ -22,8 +22,8 @@ def kind(path):
         refuse(path, f"cannot be read: {error.strerror}")
 
 
-def input_file(text):
-    """A path to read a file from: refused with the reason where it cannot be one."""
+def input_file(text, most_bytes=16 << 30, begins=b"", what=""):
+    """A path to read a file from: refused with the reason where it cannot be one, is larger, or does not begin as `what` does."""
     mode = kind(text)
     if stat.S_ISDIR(mode):
         refuse(text, "is a folder, a file is expected")
@@ -31,9 +31,36 @@ def input_file(text):
         refuse(text, "is no file")
     if not os.access(text, os.R_OK):
         refuse(text, "cannot be read: Permission denied")
-    if os.stat(text).st_size == 0:
+    size = os.stat(text).st_size
+    if size == 0:
         refuse(text, "is empty")
+    if size > most_bytes:
+        refuse(text, f"has {size} bytes, more than the {most_bytes} that are read")
+    with open(text, "rb") as file:
+        if not file.read(len(begins)).startswith(begins):
+            refuse(text, f"is no {what}")
     return pathlib.Path(text)
+
+
+def text_file(text):
+    return input_file(text, 16 << 20)
+
+
+def package(text):
+    return input_file(text, begins=b"!<arch>\ndebian-binary", what="Debian package")
+
+
+def bundle(text):
+    return input_file(text, begins=b"hsqs", what="update of `takt image build`")
+
+
+def disk(text):
+    """A disk with a partition table, as it lies in takt.img."""
+    path = input_file(text)
+    with open(path, "rb") as file:
+        if file.read(520)[512:] != b"EFI PART":
+            refuse(text, "is no disk of `takt image build`; one that is packed is unpacked first: zstd -d")
+    return path
 
 
 def input_folder(text):
