@@ -93,11 +93,11 @@ def make_esp(folder, kernel_arguments):
     (folder / "machine.cfg").write_text(f"set machine_arguments=\"{' '.join(kernel_arguments)}\"\n")
     tools.run("grub-editenv", folder / "grubenv", "create")
     tools.run("grub-editenv", folder / "grubenv", "set", "ORDER=A B", "A_OK=1", "A_TRY=0", "B_OK=0", "B_TRY=0")
-    tools.run("mmd", "-i", esp, "::EFI", "::EFI/BOOT", "::grub")
+    fixed = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the first time that FAT has
+    tools.run("mmd", "-i", esp, "::EFI", "::EFI/BOOT", "::grub", env=fixed)
     for source, place in ((efi, "EFI/BOOT/BOOTX64.EFI"), (HERE / "grub/grub.cfg", "grub/grub.cfg"), (folder / "machine.cfg", "grub/machine.cfg"),
                           (folder / "grubenv", "grub/grubenv")):
-        os.utime(source if os.access(source, os.W_OK) else folder, (0, 0))
-        tools.run("mcopy", "-i", esp, source, f"::{place}", env={**os.environ, "SOURCE_DATE_EPOCH": "315532800"})
+        tools.run("mcopy", "-i", esp, source, f"::{place}", env=fixed)
     return esp
 
 
