@@ -44,7 +44,7 @@ bool WriteQueue::behind(size_t bytes) {
 
 bool WriteQueue::push(Entry entry, bool wait) {
   const size_t bytes = entry.data.size();
-  if (bytes >= kLarge && behind(bytes)) {
+  if (!wait && bytes >= kLarge && behind(bytes)) {
     void* pages = map_as_used(bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS);
     if (pages != MAP_FAILED) {
       std::memcpy(pages, entry.data.data(), bytes);

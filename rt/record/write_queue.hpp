@@ -50,7 +50,8 @@ class WriteQueue {
   void close();
 
   static constexpr size_t kSpareBytes = 16 << 20;
-  /// Waits in pages of its own if so much, or more, waits already; smaller ones would waste most of a page.
+  /// Waits in pages of its own if it is as large and more than kSpareBytes wait with it; smaller ones would waste most
+  /// of a page. Not in virtual time, where the pusher waits for room.
   static constexpr size_t kLarge = 64 << 10;
 
  private:
