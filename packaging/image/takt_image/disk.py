@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A disk that boots by BIOS and by UEFI, put together in a file: no root, no loop device, no mount.
 
-    1  BIOS boot   GRUB's core
-    2  ESP         GRUB, its variables, the kernel's words of this machine
-    3  system-a    a slot: kernel, initrd and root in one compressed file system
-    4  system-b    the other slot, empty
+    1  ESP         GRUB, its variables, the kernel's words of this machine
+    2  system-a    a slot: kernel, initrd and root in one compressed file system
+    3  system-b    the other slot, empty
+    4  BIOS boot   GRUB's core
     5  takt-data   /var, made and grown at the first boot"""
 import os
 import pathlib
@@ -47,11 +47,11 @@ def identifier(seed, name):
 
 
 def partition(disk, layout, seed):
-    rows = ((2, "ESP", layout.esp, ESP_MIB, "ESP"), (3, "system-a", layout.slots[0], layout.slot_mib, "system"),
-            (4, "system-b", layout.slots[1], layout.slot_mib, "system"), (1, "bios", layout.bios, 1, "bios"), (5, "takt-data", layout.data, DATA_MIB, "data"))
-    # The order of the file is that of the numbers: the ESP is 1, slots are 2 and 3, as grub.cfg has them.
+    # Numbered in this order: grub.cfg has the slots as gpt2 and gpt3.
+    rows = (("ESP", layout.esp, ESP_MIB, "ESP"), ("system-a", layout.slots[0], layout.slot_mib, "system"),
+            ("system-b", layout.slots[1], layout.slot_mib, "system"), ("bios", layout.bios, 1, "bios"), ("takt-data", layout.data, DATA_MIB, "data"))
     lines = [f"start={start * MIB // SECTOR}, size={size * MIB // SECTOR}, type={TYPES[kind]}, uuid={identifier(seed, name)}, name=\"{name}\""
-             for _, name, start, size, kind in rows]
+             for name, start, size, kind in rows]
     script = f"label: gpt\nlabel-id: {identifier(seed, 'disk')}\n" + "\n".join(lines) + "\n"
     tools.run("sfdisk", "--quiet", disk, stdin=script.encode())
 

@@ -42,7 +42,7 @@ def built(checkout):
 
 
 def find(folder, home, more):
-    """The .deb files, and the folder that has graphs and schedules of the same Takt."""
+    """The .deb files of that folder, or of the checkout at `home`."""
     checkout = (home / "packaging/debian/build").exists()
     if folder is None:
         if not checkout:
