@@ -35,4 +35,24 @@ cp "$takt" "$work/takt"
 for name in bench calibrate cloud eval objects terrain train; do
   expect 3 "fix: \`./takt $name\` of a checkout builds it" env PATH=/usr/bin:/bin "$work/takt" $name
 done
+
+# The launcher of a checkout, with programs that only tell their arguments: those that are a command are not told its name.
+checkout=$work/checkout build=$work/checkout/build
+mkdir -p "$checkout/stubs" "$build/graph/command" "$build/bench"
+cp "$source/takt" "$checkout/takt" && echo bash >"$checkout/packages.txt"
+for tool in cmake ninja; do printf '#!/bin/sh\n' >"$checkout/stubs/$tool"; done
+for program in graph/command/{takt,takt-tools,takt-eval,takt-web} bench/takt-bench; do
+  printf '#!/bin/sh\necho "${0##*/}: $*"\n' >"$build/$program"
+done
+chmod +x "$checkout"/stubs/* "$build"/graph/command/* "$build"/bench/*
+becomes() { # WORDS-OF-THE-PROGRAM ARGUMENTS...
+  local wanted=$1
+  shift
+  expect 0 "" env PATH="$checkout/stubs:$PATH" TAKT_BUILD="$build" "$checkout/takt" "$@"
+  [ "$(cat "$work/stdout")" = "$wanted" ] || fail "./takt $* became '$(cat "$work/stdout")' instead of '$wanted'"
+}
+for name in bench eval web; do becomes "takt-$name: --of $name two" $name --of $name two; done
+for name in calibrate cloud objects terrain train; do becomes "takt-tools: $name --of $name" $name --of $name; done
+for name in run check top replay; do becomes "takt: $name --of $name" $name --of $name; done
+becomes "takt: run --web graph.yaml" run --web graph.yaml
 finish
