@@ -23,10 +23,13 @@ Json ms_or_null(std::optional<int64_t> ns) { return ns ? ms(*ns) : Json(nullptr)
 
 std::string name_of(const PortPlan& port) { return port.node + "." + port.port; }
 
-const graph::NodeSpec* spec_of(const Subject& subject, const std::string& node) {
-  const auto& nodes = subject.graph.nodes;
-  const auto spec = std::find_if(nodes.begin(), nodes.end(), [&](const auto& s) { return s.id == node; });
-  return spec == nodes.end() ? nullptr : &*spec;
+/// The type of a node, the kind of a device.
+std::string type_of(const Subject& subject, const std::string& id) {
+  for (const graph::NodeSpec& node : subject.graph.nodes)
+    if (node.id == id) return node.type;
+  for (const graph::DeviceSpec& device : subject.graph.devices)
+    if (device.id == id) return device.kind;
+  return "";
 }
 
 std::string process_of(const Subject& subject, size_t task) {
@@ -35,7 +38,6 @@ std::string process_of(const Subject& subject, size_t task) {
 
 Json node_json(const Subject& subject, size_t t) {
   const TaskPlan& task = subject.plan.tasks[t];
-  const graph::NodeSpec* spec = spec_of(subject, task.name);
   Json inputs = Json::array(), outputs = Json::array();
   for (const EdgePlan& edge : task.edges)
     inputs.push_back({{"name", task.node->inputs()[edge.input]->name()},
@@ -43,7 +45,7 @@ Json node_json(const Subject& subject, size_t t) {
                       {"max_age_ms", ms_or_null(edge.max_age_ns)}});
   for (const size_t port : task.ports) outputs.push_back(name_of(subject.plan.ports[port]));
   return {{"name", task.name},
-          {"type", spec != nullptr ? spec->type : ""},
+          {"type", type_of(subject, task.name)},
           {"device", task.device},
           {"process", process_of(subject, t)},
           {"rate_hz", task.rate ? Json(task.rate->hz()) : Json(nullptr)},
@@ -182,6 +184,8 @@ Json describe_json(const Subject& subject) {
           {"cores", subject.plan.cores},
           {"modes", modes},
           {"processes", subject.processes},
+          {"frozen_folder", subject.frozen_folder.string()},
+          {"replay_of", subject.replay_of},
           {"nodes", nodes},
           {"ports", ports},
           {"chains", chains},

@@ -28,14 +28,16 @@ std::vector<SocketFolder> folders() {
 }  // namespace
 
 std::vector<int> running() {
-  for (const SocketFolder& folder : folders()) {
-    std::vector<int> pids;
-    for (const int pid : folder.pids()) {
-      if (kill(pid, 0) == 0 || errno == EPERM) pids.push_back(pid);
-      else folder.remove_socket(pid);  // it was killed
+  const std::vector<SocketFolder> places = folders();
+  for (const auto whom : {SocketFolder::Of::run, SocketFolder::Of::replay})
+    for (const SocketFolder& folder : places) {
+      std::vector<int> pids;
+      for (const int pid : folder.pids(whom)) {
+        if (kill(pid, 0) == 0 || errno == EPERM) pids.push_back(pid);
+        else folder.remove_socket(pid, whom);  // it was killed
+      }
+      if (!pids.empty()) return pids;
     }
-    if (!pids.empty()) return pids;
-  }
   return {};
 }
 
@@ -98,14 +100,15 @@ bool Connection::gone() const {
 }
 
 std::optional<Connection> connect_to(int pid) {
-  for (const SocketFolder& folder : folders()) {
-    const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (descriptor < 0) return std::nullopt;
-    const sockaddr_un address = folder.address(pid);
-    if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-      return Connection(descriptor);
-    close(descriptor);
-  }
+  for (const SocketFolder& folder : folders())
+    for (const auto whom : {SocketFolder::Of::run, SocketFolder::Of::replay}) {
+      const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+      if (descriptor < 0) return std::nullopt;
+      const sockaddr_un address = folder.address(pid, whom);
+      if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+        return Connection(descriptor);
+      close(descriptor);
+    }
   return std::nullopt;
 }
 

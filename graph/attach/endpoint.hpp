@@ -12,6 +12,7 @@
 namespace takt::attach {
 
 /// Process ids of the runs that can be spoken to: of this user; if there are none, of the service (see SocketFolder).
+/// Replays are not among them, as long as there is a run.
 std::vector<int> running();
 
 /// One connection, of either side. Reads and writes block, at most `patience_ms` each.
@@ -43,7 +44,7 @@ class Connection {
   std::string rest_;
 };
 
-/// To the run with that process id, of this user or of the service.
+/// To the run or replay with that process id, of this user or of the service.
 std::optional<Connection> connect_to(int pid);
 
 }  // namespace takt::attach

@@ -38,6 +38,12 @@ void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms
 
 int64_t now_ns() { return MonotonicClock().now_ns(); }
 
+bool changes(const Json& question) {
+  const std::string what = question.value("do", "");
+  return what == "mode" || what == "set" || what == "forget" || what == "answer" || what == "mark" ||
+         (what == "fault" && !question.value("fault", "").empty());
+}
+
 Json wrong(const std::string& text) { return {{"error", text}}; }
 
 /// The user of the other side; nothing if the kernel does not say.
@@ -66,7 +72,7 @@ Server::~Server() {
   if (thread_.joinable()) thread_.join();
   for (Client& client : clients_) client.thread.join();
   if (listener_ >= 0) close(listener_);
-  if (folder_) folder_->remove_socket(subject_.run);
+  if (folder_) folder_->remove_socket(subject_.run, whom());
 }
 
 void Server::open() {
@@ -78,9 +84,9 @@ void Server::open() {
     return;
   }
   if (!passed_over.empty()) note_ = fmt::format("sockets lie in {}: {}", folder_->path().string(), passed_over);
-  folder_->remove_socket(subject_.run);  // of a dead process that had our number
+  folder_->remove_socket(subject_.run, whom());  // of a dead process that had our number
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const sockaddr_un address = folder_->address(subject_.run);
+  const sockaddr_un address = folder_->address(subject_.run, whom());
   if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
       chmod(address.sun_path, folder_->for_group() ? 0660 : 0600) != 0 ||
       listen(listener_, static_cast<int>(kMostClients)) != 0)
@@ -149,6 +155,9 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
   if (what == "echo") return echo(question, connection);
   if (what == "describe") return connection.write(describe_json(subject_));
   if (what == "follow") return Follow(subject_, taps_, connection).run(ending_), false;
+  if (!subject_.replay_of.empty() && changes(question))
+    return connection.write(
+        wrong(fmt::format("this is a replay of {}: it can be looked at, and stopped", subject_.replay_of)));
   if (what == "mode") return connection.write(change_mode(question.value("mode", "")));
   if (what == "get") return connection.write(get(question.value("param", "")));
   if (what == "set")

@@ -69,6 +69,10 @@ class Server {
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
   /// Of a node; "" of a device.
   std::string type_of(const std::string& node) const;
+  /// A replay's sockets are apart from those of runs.
+  SocketFolder::Of whom() const {
+    return subject_.replay_of.empty() ? SocketFolder::Of::run : SocketFolder::Of::replay;
+  }
 
   const Subject subject_;
   std::string lacks_;

@@ -20,6 +20,13 @@
 namespace takt::attach {
 namespace {
 
+/// A replay is never taken for the run that somebody wants to stop.
+constexpr std::string_view kOfReplay = "replay-";
+
+std::string socket_name(int pid, SocketFolder::Of whom) {
+  return fmt::format("{}{}.sock", whom == SocketFolder::Of::replay ? kOfReplay : "", pid);
+}
+
 constexpr mode_t kAnyOther = S_IRWXG | S_IRWXO, kOthersWrite = S_IWGRP | S_IWOTH;
 
 std::string name_of(uid_t user) {
@@ -124,24 +131,26 @@ SocketFolder::~SocketFolder() {
   if (descriptor_ >= 0) close(descriptor_);
 }
 
-sockaddr_un SocketFolder::address(int pid) const {
+sockaddr_un SocketFolder::address(int pid, Of whom) const {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  fmt::format_to_n(address.sun_path, sizeof address.sun_path - 1, "/proc/self/fd/{}/{}.sock", descriptor_, pid);
+  fmt::format_to_n(address.sun_path, sizeof address.sun_path - 1, "/proc/self/fd/{}/{}", descriptor_,
+                   socket_name(pid, whom));
   return address;
 }
 
-std::vector<int> SocketFolder::pids() const {
+std::vector<int> SocketFolder::pids(Of whom) const {
   std::vector<int> found;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(fmt::format("/proc/self/fd/{}", descriptor_), error)) {
-    const int pid = std::atoi(entry.path().stem().c_str());
-    if (entry.path().extension() == ".sock" && pid > 0) found.push_back(pid);
+    const std::string name = entry.path().stem();
+    const int pid = std::atoi(name.c_str() + (name.starts_with(kOfReplay) ? kOfReplay.size() : 0));
+    if (pid > 0 && entry.path().filename() == socket_name(pid, whom)) found.push_back(pid);
   }
   std::sort(found.begin(), found.end());
   return found;
 }
 
-void SocketFolder::remove_socket(int pid) const { unlinkat(descriptor_, fmt::format("{}.sock", pid).c_str(), 0); }
+void SocketFolder::remove_socket(int pid, Of whom) const { unlinkat(descriptor_, socket_name(pid, whom).c_str(), 0); }
 
 }  // namespace takt::attach

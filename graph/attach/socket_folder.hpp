@@ -48,11 +48,12 @@ class SocketFolder {
   const std::filesystem::path& path() const { return path_; }
   /// Members of its group may speak to the runs in it.
   bool for_group() const { return (mode_ & S_IXGRP) != 0; }
-  /// Of the run with that process id, by the descriptor: as long as this object lives.
-  sockaddr_un address(int pid) const;
+  enum class Of { run, replay };
+  /// Of the run or replay with that process id, by the descriptor: as long as this object lives.
+  sockaddr_un address(int pid, Of whom = Of::run) const;
   /// Process ids of the sockets in it, sorted.
-  std::vector<int> pids() const;
-  void remove_socket(int pid) const;
+  std::vector<int> pids(Of whom = Of::run) const;
+  void remove_socket(int pid, Of whom = Of::run) const;
 
  private:
   SocketFolder(int descriptor, std::filesystem::path path, mode_t mode)

@@ -2,6 +2,7 @@
 #pragma once
 #include <unistd.h>
 
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -25,6 +26,10 @@ struct Subject {
   std::function<std::vector<std::string>()> frozen = {};
   std::vector<std::string> processes = {};  ///< names, in the order of the board; empty: `run` does it all
   std::vector<size_t> process_of = {};      ///< by task: index into `processes`
+  /// Where that was written; empty: nowhere.
+  std::filesystem::path frozen_folder = {};
+  /// Of a replay its record: it is shown, and cannot be changed. Empty: a run.
+  std::string replay_of = {};
 };
 
 }  // namespace takt::attach

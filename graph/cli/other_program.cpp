@@ -12,9 +12,13 @@
 namespace takt::command {
 namespace {
 
-std::vector<std::filesystem::path> program_folders() {
+std::filesystem::path own_folder() {
   std::error_code unreadable;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe", unreadable).parent_path();
+  return std::filesystem::read_symlink("/proc/self/exe", unreadable).parent_path();
+}
+
+std::vector<std::filesystem::path> program_folders() {
+  const std::filesystem::path beside = own_folder();
   std::vector<std::filesystem::path> folders{beside.parent_path() / "libexec/takt", beside};
   const char* path = std::getenv("PATH");
   std::istringstream parts(path != nullptr ? path : "");
@@ -32,6 +36,12 @@ std::filesystem::path other_program(std::string_view name) {
     if (std::filesystem::is_regular_file(program, ignored) && access(program.c_str(), X_OK) == 0) return program;
   }
   return {};
+}
+
+std::filesystem::path takt_program() {
+  const std::filesystem::path beside = own_folder();
+  const bool installed = beside.filename() == "takt" && beside.parent_path().filename() == "libexec";
+  return (installed ? beside.parent_path().parent_path() / "bin" : beside) / "takt";
 }
 
 }  // namespace takt::command

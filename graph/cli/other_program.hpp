@@ -9,4 +9,7 @@ namespace takt::command {
 /// is none.
 std::filesystem::path other_program(std::string_view name);
 
+/// That of `takt` itself, for such a program.
+std::filesystem::path takt_program();
+
 }  // namespace takt::command

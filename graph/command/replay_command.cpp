@@ -9,14 +9,17 @@
 #include <iostream>
 
 #include "graph/cli/file_option.hpp"
+#include "graph/cli/other_program.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/command/what_if_command.hpp"
 #include "graph/log/damages.hpp"
 #include "graph/rewind/bisect.hpp"
 #include "graph/rewind/inspector.hpp"
+#include "graph/rewind/shown_replay.hpp"
 #include "graph/run/isolated_replay.hpp"
 #include "graph/run/outputs.hpp"
 #include "graph/run/support.hpp"
+#include "graph/run/web_beside.hpp"
 
 namespace takt::command {
 namespace {
@@ -31,9 +34,13 @@ class Replay {
   RunOptions& open() { return run_.open(); }
 
   int run(const Registry& registry) {
+    // Before this process has a second thread.
+    if (const int code = options_.web ? prepare_web() : kOk; code != kOk) return code;
     if (const int code = run_.compose(registry); code != kOk) return code;
     if (options_.inspect || !options_.until_condition.empty()) return explore();
-    return judge(replay([this](const ReplayPart& part) { return run_.run(part.how); }));
+    return judge(replay([&](const ReplayPart& part) {
+      return options_.recorded_pace ? run_shown(registry, part) : run_.run(part.how);
+    }));
   }
 
   int rehearse(const Registry& registry) { return run_.compose(registry); }
@@ -48,6 +55,24 @@ class Replay {
   }
 
  private:
+  int prepare_web() {
+    const std::string program = other_program("web").string();
+    if (program.empty())
+      return refuse("--web: takt-web is not there; `./takt web --help` of a checkout builds it (libwebsockets-dev)",
+                    kDeviceOrSystem);
+    web_.emplace(std::vector<std::string>{program, "--with-run", std::to_string(getpid()), "--port", "0"});
+    return kOk;
+  }
+
+  record::ReplayResult run_shown(const Registry& registry, const ReplayPart& part) {
+    rewind::ShownReplay shown(run_, registry, part.how);
+    std::vector<std::string> adjusted;
+    tell_attach(shown.server(), adjusted);
+    if (web_)
+      if (const auto begun = web_->begin(); !begun) throw std::runtime_error(begun.error());
+    return run_.run(shown.how());
+  }
+
   /// --break, --inspect.
   int explore() {
     rewind::Inspector inspector(run_);
@@ -134,6 +159,7 @@ class Replay {
 
   const ReplayOptions& options_;
   RecordedRun run_;
+  std::optional<WebBeside> web_;
   MonotonicClock clock_;
   int64_t took_ns_ = 0;
   size_t processes_ = 1;
@@ -215,9 +241,13 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
                      "ends at the first job whose message passes, such as 'port: ego_motion.motion, field: valid, "
                      "at_most: 0', and shows it");
   replay->add_flag("--inspect", o.inspect, "shows one job after the other; asks which (help)");
-  replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
-      ->check(CLI::IsMember({"none", "subsystem"}));
-  replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
+  CLI::Option* isolate =
+      replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
+          ->check(CLI::IsMember({"none", "subsystem"}));
+  replay->add_flag("--recorded-pace", o.recorded_pace,
+                   "as fast as it was, instead of as fast as possible; in one process takt top, echo and web show it");
+  replay->add_flag("--web", o.web, "with takt web beside it, at a free port of this machine, at the pace of the record")
+      ->excludes(isolate);
   writes_folder(replay->add_option("--output", o.output, "folder for pictures and other results (default out)"));
   add_what_if_options(*replay, o);
   replay->footer(
@@ -227,6 +257,7 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
       "Example: takt replay run.mcap --from 95 --inspect");
   replay->callback([&] {
     if (!o.until_condition.empty()) o.conditions.push_back(o.until_condition);
+    o.recorded_pace = o.recorded_pace || o.web;
     exit_code = command::replay(plugins, o);
   });
 }

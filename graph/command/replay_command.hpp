@@ -9,7 +9,7 @@
 namespace takt::command {
 
 struct ReplayOptions : rewind::ReplayOptions {
-  bool inspect = false;
+  bool inspect = false, web = false;
   std::string until_condition;  ///< of --break
   // A what-if; see what_if_command.hpp.
   std::filesystem::path schedule, report;  ///< empty: that of the record; none is written

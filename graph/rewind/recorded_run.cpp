@@ -125,6 +125,7 @@ int RecordedRun::compose() {
     graph::ComposeOptions& how = composed_;
     how.output = options_.output;
     how.seed = run_.seed;
+    if (options_.recorded_pace) how.observers.taps = 1;  // somebody may look (ShownReplay)
     how.exchange = &facts;
     how.owns = [this](const std::string& id) {
       return std::none_of(prepared_->graph->devices.begin(), prepared_->graph->devices.end(),

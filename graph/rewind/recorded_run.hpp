@@ -37,6 +37,8 @@ class RecordedRun {
   void compose_again();
 
   record::LogFile& log() { return *file_; }
+  /// Of the record.
+  std::string name() const { return options_.log.filename().string(); }
   const graph::GraphSpec& graph() const { return *prepared_->graph; }
   const Plan& plan() const { return prepared_->composition->plan; }
   int64_t epoch_ns() const;

@@ -148,7 +148,7 @@ class IsolatedRun {
     {
       const attach::Server server({registry_, graph_, plan_, board_, *transport_, run,
                                    [this] { return record_.frozen(); }, partition_.names,
-                                   process_of_tasks(plan_, partition_)});
+                                   process_of_tasks(plan_, partition_), record_.frozen_folder()});
       tell_attach(server, adjusted_);
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,

@@ -112,6 +112,10 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   for (const std::string& doubt : flight_->doubts()) std::fprintf(stderr, "takt: note: %s\n", doubt.c_str());
 }
 
+std::filesystem::path RunRecord::frozen_folder() const {
+  return flight_ ? std::filesystem::absolute(options_.output / "flight/frozen") : std::filesystem::path();
+}
+
 record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan, const Transport& transport,
                                 const std::string& isolation) {
   record::Head head;

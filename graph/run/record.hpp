@@ -60,6 +60,8 @@ class RunRecord {
   void let_go() { recorder_.reset(), flight_.reset(); }
   /// After the last event was taken; `unheard_threads` noted none.
   void finish(const RunResult& result, uint64_t unheard_threads);
+  /// Where frozen windows are written; empty: nowhere.
+  std::filesystem::path frozen_folder() const;
   /// What froze the ring so far, the newest last: a sentence each.
   std::vector<std::string> frozen() const { return flight_ ? flight_->sentences() : std::vector<std::string>{}; }
   /// Adds "record" and "recorder_lost" to the report, and "flight" of the ring.

@@ -84,8 +84,16 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     record.begin(graph, composition.plan, board, *transport, "none");
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
     if (!prepared.clock->is_virtual())
-      server.emplace(attach::Subject{prepared.registry, graph, composition.plan, board, *transport, getpid(),
-                                     [&record] { return record.frozen(); }});
+      server.emplace(attach::Subject{prepared.registry,
+                                     graph,
+                                     composition.plan,
+                                     board,
+                                     *transport,
+                                     getpid(),
+                                     [&record] { return record.frozen(); },
+                                     {},
+                                     {},
+                                     record.frozen_folder()});
     if (server) tell_attach(*server, adjusted);
     std::optional<LiveTable> live;
     if (options.witness == nullptr)

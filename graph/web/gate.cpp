@@ -48,7 +48,7 @@ bool Gate::known(std::string_view host) const {
 }
 
 bool Gate::host(std::string_view header) const {
-  const std::string_view host = without_port(header, port_);
+  const std::string_view host = without_port(header, port);
   return !host.empty() && known(host);
 }
 

@@ -19,18 +19,18 @@ bool same_token(std::string_view given, std::string_view token);
 class Gate {
  public:
   /// `hosts`: names and addresses without a port; loopback's are always among them.
-  Gate(std::vector<std::string> hosts, int port) : hosts_(std::move(hosts)), port_(port) {}
+  explicit Gate(std::vector<std::string> hosts, int port = 0) : port(port), hosts_(std::move(hosts)) {}
   /// The header Host: "localhost:8765", "[::1]:8765". Empty: refused.
   bool host(std::string_view header) const;
   /// The header Origin: "http://localhost:8765". Programs that are no browser send none: let in. Those of `origins`
   /// are, too: Foxglove's.
   bool origin(std::string_view header) const;
   std::vector<std::string> origins = {};
+  int port;
 
  private:
   bool known(std::string_view host) const;
   std::vector<std::string> hosts_;
-  int port_;
 };
 
 }  // namespace takt::web

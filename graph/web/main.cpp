@@ -14,8 +14,10 @@
 #include "graph/ace/ace_registry.hpp"
 #include "graph/attach/socket_folder.hpp"
 #include "graph/cli/boundary.hpp"
+#include "graph/cli/other_program.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/language/graph.hpp"
+#include "graph/web/frozen_files.hpp"
 #include "graph/web/link.hpp"
 #include "graph/web/server.hpp"
 #include "rt/capability.hpp"
@@ -40,6 +42,10 @@ std::string page_address(const ServerOptions& server) {
   const std::string host = server.address.find(':') != std::string::npos ? "[" + server.address + "]" : server.address;
   return fmt::format("{}://{}:{}/#token={}", server.certificate.empty() ? "http" : "https", host, server.port,
                      server.token);
+}
+
+std::filesystem::path frozen_folder(const Json& graph) {
+  return graph.is_object() ? graph.value("frozen_folder", "") : "";
 }
 
 /// Ends the server at SIGINT, SIGTERM or SIGHUP (not under nohup), which every thread made after this blocks: a flag
@@ -78,7 +84,7 @@ int serve(Options options) {
     const int code = command::write_output(options.token_file, options.server.token + "\n", "--token-file");
     if (code != command::kOk) return code;
   }
-  Gate gate(options.hosts, options.server.port);
+  Gate gate(options.hosts);
   gate.origins = options.origins;
   const Registry registry = ace_registry();
   const graph::MessageTypes types = graph::message_types(registry);
@@ -87,15 +93,21 @@ int serve(Options options) {
     if (server) server->wake();
   });
   std::unique_ptr<Link> link;
+  FrozenFiles files([&hub] { return frozen_folder(hub.graph()); }, command::takt_program());
+  const auto answer = [&](const Json& question) {
+    return FrozenFiles::is_asked(question) ? files.answer(question) : link->ask(question);
+  };
   try {
     server = std::make_unique<Server>(
-        hub, [&link](const Json& question) { return link->ask(question); }, options.server, std::move(gate));
+        hub, answer, [&files](const auto& name, const auto& ticket) { return files.redeem(name, ticket); },
+        options.server, std::move(gate));
   } catch (const std::runtime_error& problem) {
     return refuse(fmt::format("{}\n  fix: another --port, or --address of this machine", problem.what()),
                   kDeviceOrSystem);
   }
   link =
       std::make_unique<Link>(hub, types, Link::Options{.run = options.with_run > 0 ? options.with_run : options.run});
+  options.server.port = server->port();
   fmt::print("{}\nFoxglove: ws{}://{}:{}\n", page_address(options.server),
              options.server.certificate.empty() ? "" : "s", options.server.address, options.server.port);
   if (std::fflush(stdout) != 0)
@@ -113,8 +125,8 @@ int run(int argc, char** argv) {
   app.add_option("--run", options.run, "process id of the run; without it the one that there is");
   app.add_option("--with-run", options.with_run, "process id of a run that may still have to begin; ends with it")
       ->excludes("--run");
-  app.add_option("--port", options.server.port, "TCP port of page and Foxglove, 8765 by default")
-      ->check(CLI::Range(1, 65535));
+  app.add_option("--port", options.server.port, "TCP port of page and Foxglove, 8765 by default; 0: one that is free")
+      ->check(CLI::Range(0, 65535));
   app.add_option(
       "--address", options.server.address,
       "address of this machine, 127.0.0.1 by default; any but loopback needs --certificate and --key, and the "

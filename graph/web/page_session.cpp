@@ -14,9 +14,11 @@ namespace {
 constexpr size_t kMostLooks = 64;
 constexpr double kScreenHz = 60;
 constexpr std::array<std::string_view, 7> kKinds{"picture", "disparity", "cloud", "scan", "grid", "pose", "value"};
-/// Questions that change the run.
+/// Questions that change the run; these and kFetches need the token.
 constexpr std::array<std::string_view, 6> kChanges{"set", "forget", "mode", "mark", "stop", "answer"};
-constexpr std::array<std::string_view, 3> kLooks{"get", "top", "fault"};
+/// Questions for what lies on the disk of the robot: its records, and a server that shows one.
+constexpr std::array<std::string_view, 3> kFetches{"download", "replay", "replayed"};
+constexpr std::array<std::string_view, 4> kLooks{"get", "top", "fault", "frozen"};
 
 template <size_t N>
 bool among(const std::array<std::string_view, N>& words, std::string_view word) {
@@ -29,9 +31,9 @@ std::string text(const Json& of, const char* key) {
   return found != of.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
-bool changes(const Json& question) {
+bool needs_token(const Json& question) {
   const std::string what = text(question, "do");
-  return among(kChanges, what) || (what == "fault" && question.contains("fault"));
+  return among(kChanges, what) || among(kFetches, what) || (what == "fault" && question.contains("fault"));
 }
 
 class PageSession final : public Session {
@@ -148,9 +150,9 @@ class PageSession final : public Session {
     const Json question = said.value("question", Json());
     const auto refuse = [&](const char* why) { send(Json{{"op", "answer"}, {"id", id}, {"error", why}}); };
     if (!question.is_object()) return refuse("a question is an object with `do`");
-    if (changes(question) && !may_change_)
+    if (needs_token(question) && !may_change_)
       return refuse("this needs the token: open the address that `takt web` printed");
-    if (!changes(question) && (!may_look() || !among(kLooks, text(question, "do"))))
+    if (!needs_token(question) && (!may_look() || !among(kLooks, text(question, "do"))))
       return refuse("the page may not ask that");
     room().ask(number(), question, [this, id](Json answer) {
       answer["op"] = "answer";

@@ -19,6 +19,7 @@ namespace {
 constexpr size_t kMostSessions = 32;
 constexpr size_t kLongestMessage = 64 << 10;  ///< from the other side
 constexpr const char* kPageProtocol = "takt.v1";
+constexpr std::string_view kFrozen = "/frozen/";
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' ws: wss:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -27,6 +28,13 @@ std::string header_of(lws* connection, lws_token_indexes which) {
   std::array<char, 512> text{};
   const int length = lws_hdr_copy(connection, text.data(), static_cast<int>(text.size()), which);
   return length > 0 ? std::string(text.data(), static_cast<size_t>(length)) : std::string();
+}
+
+/// Of the address; empty: it is not there.
+std::string argument_of(lws* connection, const char* name) {
+  std::array<char, 128> text{};
+  const char* found = lws_get_urlarg_by_name(connection, name, text.data(), static_cast<int>(text.size()));
+  return found != nullptr ? found : "";
 }
 
 bool add_header(lws* connection, const char* name, std::string_view value, unsigned char** at, unsigned char* end) {
@@ -39,8 +47,9 @@ bool add_header(lws* connection, const char* name, std::string_view value, unsig
 
 class Server::Inside {
  public:
-  Inside(Hub& hub, Ask ask, const ServerOptions& options, Gate gate)
+  Inside(Hub& hub, Ask ask, File file, const ServerOptions& options, Gate gate)
       : gate_(std::move(gate)),
+        file_(std::move(file)),
         asking_(std::move(ask), [this] { wake(); }),
         room_{hub, options.token, options.token_to_look, [this](uint64_t session, Json question, Asking::Then then) {
                 asking_.ask(session, std::move(question), std::move(then));
@@ -66,6 +75,7 @@ class Server::Inside {
     if (context_ == nullptr)
       throw std::runtime_error(fmt::format("port {} of {} cannot be served: it is taken, or not this machine's",
                                            options.port, options.address));
+    gate_.port = lws_get_vhost_listen_port(lws_get_vhost_by_name(context_, info.vhost_name));
   }
   ~Inside() {
     asking_.end();
@@ -78,6 +88,7 @@ class Server::Inside {
     while (!ending_.load() && lws_service(context_, 0) >= 0) {
     }
   }
+  int port() const { return gate_.port; }
   void end() {
     ending_.store(true);
     wake();
@@ -106,6 +117,7 @@ class Server::Inside {
     switch (reason) {
       case LWS_CALLBACK_HTTP: return inside->answer_http(connection, bytes);
       case LWS_CALLBACK_HTTP_WRITEABLE: return inside->send_file(connection);
+      case LWS_CALLBACK_HTTP_FILE_COMPLETION: return lws_http_transaction_completed(connection) != 0 ? -1 : 0;
       case LWS_CALLBACK_CLOSED_HTTP: inside->files_.erase(connection); return 0;
       case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: return inside->let_in(connection) ? 0 : -1;
       case LWS_CALLBACK_ESTABLISHED: inside->begin(connection); return 0;
@@ -126,6 +138,7 @@ class Server::Inside {
   int answer_http(lws* connection, std::string_view path) {
     if (!gate_.host(header_of(connection, WSI_TOKEN_HOST)))
       return refuse(connection, HTTP_STATUS_FORBIDDEN, "not under this name");
+    if (path.starts_with(kFrozen)) return hand_out(connection, std::string(path.substr(kFrozen.size())));
     const PageFile* file = page_file(path);
     if (file == nullptr) return refuse(connection, HTTP_STATUS_NOT_FOUND, "there is no such page");
     std::array<unsigned char, LWS_PRE + 2048> buffer{};
@@ -140,6 +153,16 @@ class Server::Inside {
     files_[connection] = file;
     lws_callback_on_writable(connection);
     return 0;
+  }
+
+  /// A frozen record, to who has a ticket for it.
+  int hand_out(lws* connection, const std::string& name) {
+    const auto file = file_(name, argument_of(connection, "ticket="));
+    if (!file) return refuse(connection, HTTP_STATUS_FORBIDDEN, "this needs a new ticket: the page asks for one");
+    const std::string header = fmt::format("content-disposition: attachment; filename=\"{}\"\x0d\x0a", name);
+    const int sent = lws_serve_http_file(connection, file->c_str(), "application/octet-stream", header.c_str(),
+                                         static_cast<int>(header.size()));
+    return sent < 0 || (sent > 0 && lws_http_transaction_completed(connection) != 0) ? -1 : 0;
   }
 
   int send_file(lws* connection) {
@@ -158,9 +181,7 @@ class Server::Inside {
     if (protocol == nullptr || protocol->name == std::string_view("http") || peers_.size() >= kMostSessions ||
         !gate_.host(header_of(connection, WSI_TOKEN_HOST)) || !gate_.origin(header_of(connection, WSI_TOKEN_ORIGIN)))
       return false;
-    std::array<char, 128> given{};
-    const char* token = lws_get_urlarg_by_name(connection, "token=", given.data(), static_cast<int>(given.size()));
-    const bool may_change = token != nullptr && same_token(token, room_.token);
+    const bool may_change = same_token(argument_of(connection, "token="), room_.token);
     const bool page = protocol->name == std::string_view(kPageProtocol);  // says its token later
     if (!page && room_.token_to_look && !may_change) return false;
     Peer& peer = peers_[connection];
@@ -221,7 +242,8 @@ class Server::Inside {
     }
   }
 
-  const Gate gate_;
+  Gate gate_;
+  const File file_;
   Asking asking_;
   const Room room_;
   lws_context* context_ = nullptr;
@@ -231,9 +253,10 @@ class Server::Inside {
   std::map<lws*, const PageFile*> files_;
 };
 
-Server::Server(Hub& hub, Ask ask, const ServerOptions& options, Gate gate)
-    : inside_(std::make_unique<Inside>(hub, std::move(ask), options, std::move(gate))) {}
+Server::Server(Hub& hub, Ask ask, File file, const ServerOptions& options, Gate gate)
+    : inside_(std::make_unique<Inside>(hub, std::move(ask), std::move(file), options, std::move(gate))) {}
 Server::~Server() = default;
+int Server::port() const { return inside_->port(); }
 void Server::run() { inside_->run(); }
 void Server::end() { inside_->end(); }
 void Server::wake() { inside_->wake(); }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "graph/web/gate.hpp"
@@ -13,7 +14,7 @@ namespace takt::web {
 
 struct ServerOptions {
   std::string address = "127.0.0.1";
-  int port = 8765;
+  int port = 8765;  ///< 0: one that is free
   std::string token;
   bool token_to_look = false;
   std::filesystem::path certificate, key;  ///< PEM; both or none
@@ -26,11 +27,16 @@ struct ServerOptions {
 class Server {
  public:
   using Ask = std::function<Json(const Json& question)>;
-  /// `ask` blocks; it is called on threads of the server's own. All given outlives this. Throws std::runtime_error.
-  Server(Hub& hub, Ask ask, const ServerOptions& options, Gate gate);
+  /// The file that may be fetched once under that name, with that ticket.
+  using File = std::function<std::optional<std::filesystem::path>(const std::string& name, const std::string& ticket)>;
+  /// `ask` blocks; it is called on threads of the server's own, `file` on that of run(). All given outlives this.
+  /// Throws std::runtime_error.
+  Server(Hub& hub, Ask ask, File file, const ServerOptions& options, Gate gate);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
+  /// That it listens at.
+  int port() const;
   /// Until end() is called.
   void run();
   /// Any thread, also a signal handler.

@@ -89,6 +89,11 @@ PY
     "$takt" top --once --json --run $run | grep -q '"value":0.4' || fail "the parameter that the page set"
     grep -rq "0.4" "$work/state" || fail "the parameter that the page kept"
     [ "$(find "$work/pictures" -size +10k | wc -l)" = 8 ] || fail "eight pictures"
+    echo "=== what the mark froze is fetched, and replayed in a page of its own"
+    client replayed.mjs "$address" "$work/pictures" >"$work/replayed.json" || fail "the replay in the page"
+    cat "$work/replayed.json"
+    fetched=$(find "$work/pictures" -name '*.mcap')
+    cmp "$fetched" "$work/main/flight/frozen/${fetched##*/}" || fail "the record that was fetched"
   else
     echo "NOT RUN: the page needs a browser: apt install chromium"
   fi

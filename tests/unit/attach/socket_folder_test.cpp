@@ -143,3 +143,20 @@ TEST_CASE("a service has the folder that its service manager made, with its grou
   chmod(service.c_str(), 0770);
   CHECK_FALSE(SocketFolder::of_service(operators));
 }
+
+TEST_CASE("the sockets of replays lie beside those of runs and are never taken for one") {
+  Machine machine;
+  std::string why;
+  const auto folder = SocketFolder::own(machine.where, why);
+  REQUIRE(folder);
+  for (const char* name : {"12.sock", "7.sock", "replay-9.sock", "replay-.sock", "replay-8", "x3.sock", "5.sock.old"})
+    std::ofstream(folder->path() / name) << "";
+  CHECK(folder->pids() == std::vector<int>{7, 12});
+  CHECK(folder->pids(SocketFolder::Of::replay) == std::vector<int>{9});
+  CHECK(std::string(folder->address(9).sun_path).ends_with("/9.sock"));
+  CHECK(std::string(folder->address(9, SocketFolder::Of::replay).sun_path).ends_with("/replay-9.sock"));
+  folder->remove_socket(9);
+  CHECK(folder->pids(SocketFolder::Of::replay).size() == 1);
+  folder->remove_socket(9, SocketFolder::Of::replay);
+  CHECK(folder->pids(SocketFolder::Of::replay).empty());
+}

@@ -53,6 +53,8 @@ export interface Graph {
   schedule: string;
   version: string;
   pid: number;
+  /** Of a replay the name of its record. */
+  replay_of?: string;
   cores: number[];
   modes: string[];
   processes: string[];

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records: marks set and to be set, and the sentences of what was frozen.
+// Records: marks set and to be set, the sentences of what was frozen, and the records of it.
 import { type App, guard, type View } from "./app.ts";
 import { send_mark } from "./controls.ts";
 import { card, h, set_text } from "./dom.ts";
 import { seconds } from "./format.ts";
+import { FrozenFiles } from "./frozen_files.ts";
 import { repaint } from "./repaint.ts";
 
 const kMostShown = 300;
@@ -21,11 +22,13 @@ export class Records implements View {
   private readonly said = h("p", { class: "quiet", role: "status" });
   private readonly marks = h("ol", { class: "entries" });
   private readonly frozen = h("ol", { class: "entries" });
+  private readonly files: FrozenFiles;
   private visible = false;
   private shown = "";
   private readonly draw = () => this.update();
 
   constructor(private readonly app: App) {
+    this.files = new FrozenFiles(app, this.error);
     const send = h("button", { class: "main", type: "submit" }, "Mark");
     guard(app.store, send, this.words);
     const form = h("form", { class: "mark-form", submit: (event: Event) => void this.mark(event) }, this.words, send);
@@ -42,6 +45,7 @@ export class Records implements View {
         this.said,
       ),
       h("div", { class: "two" }, card("Frozen", this.frozen), card("Marks", this.marks)),
+      card("Frozen records", this.files.root),
     );
     app.store.changed.on(() => this.visible && repaint(this.draw));
     app.store.events_came.on(() => this.visible && repaint(this.draw));
@@ -49,11 +53,13 @@ export class Records implements View {
 
   show(): void {
     this.visible = true;
+    this.files.show();
     repaint(this.draw);
   }
 
   hide(): void {
     this.visible = false;
+    this.files.hide();
   }
 
   private async mark(event: Event): Promise<void> {

@@ -123,7 +123,8 @@ export class Shell {
   private tell(): void {
     const { store } = this.app;
     const { graph } = store;
-    if (graph) set_text(this.run, `${graph.name}, ${graph.profile}, ${graph.schedule}, ${graph.policy}`);
+    const replay = graph?.replay_of ? `Replay of ${graph.replay_of}: ` : "";
+    if (graph) set_text(this.run, `${replay}${graph.name}, ${graph.profile}, ${graph.schedule}, ${graph.policy}`);
     this.run.title = graph ? `${graph.version}, process ${graph.pid}` : "";
     const trouble = this.trouble();
     set_class(this.light, trouble === "" ? "light good" : "light bad");
@@ -131,7 +132,7 @@ export class Shell {
     document.body.classList.toggle("stale", trouble !== "");
     this.banner.hidden = trouble === "";
     set_text(this.banner, trouble);
-    document.title = graph ? `${graph.name} – Takt` : "Takt";
+    document.title = graph ? `${replay}${graph.name} – Takt` : "Takt";
   }
 
   private trouble(): string {

@@ -105,6 +105,7 @@ export class Store {
   why_not(): string {
     if (this.connection !== "open") return "no connection to takt web";
     if (this.gone !== "") return "the run has ended";
+    if (this.graph?.replay_of) return "this is a replay";
     return this.may_change ? "" : "open the address that takt web printed";
   }
 

@@ -86,6 +86,44 @@ check("mark, in the dialog and in the records", { view: "records" }, async (page
   );
 });
 
+check("frozen records: fetched, replayed in a page of its own, and why not", { view: "records" }, async (page) => {
+  const row = page.locator('[data-file="ace-2-mark.mcap"]');
+  await until(async () => /241\.0 MB/.test(await row.textContent()), "the list");
+  assert.equal(await page.locator("[data-file]").count(), 2);
+  const saved = page.waitForEvent("download");
+  await row.getByRole("button", { name: "Download" }).click();
+  assert.equal((await saved).suggestedFilename(), "ace-2-mark.mcap");
+  assert.deepEqual(asked("download"), [{ do: "download", file: "ace-2-mark.mcap" }]);
+  assert.ok(server.requests.includes("/frozen/ace-2-mark.mcap?ticket=abc"), server.requests);
+
+  const address = server.address("replay", "overview");
+  server.model.replay_end = { state: "shown", address };
+  const opened = page.waitForEvent("popup");
+  await row.getByRole("button", { name: "Replay" }).click();
+  const other = await opened;
+  await other.waitForURL(address);
+  await until(
+    async () => /is replayed in the other page/.test(await page.locator("#panel-records").textContent()),
+    "where it is",
+  );
+  await other.close();
+  server.model.replay_end = { state: "ended", why: "the record is damaged" };
+  await row.getByRole("button", { name: "Replay" }).click();
+  await until(
+    async () =>
+      /is not replayed: the record is damaged/.test(await page.locator("#panel-records .error").textContent()),
+    "why not",
+  );
+});
+
+check("a replay says so and changes nothing", {}, async (page) => {
+  server.graph.replay_of = "ace-2-mark.mcap";
+  for (const client of server.clients) server.hello(client);
+  await until(async () => (await page.title()).startsWith("Replay of ace-2-mark.mcap: ace"), "the title");
+  await until(async () => page.locator("[data-control=stop]").isDisabled(), "the button");
+  assert.match(await page.locator("[data-control=stop]").getAttribute("title"), /this is a replay/);
+});
+
 check(
   "parameters: set with the unit, kept, refused, forgotten",
   { width: 1600, height: 900, view: "parameters" },

@@ -14,7 +14,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 export const kPolicy =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'";
 const kTypes = { "index.html": "text/html", "page.js": "text/javascript", "page.css": "text/css" };
-const kChanges = ["set", "forget", "mode", "mark", "stop", "answer"];
+const kChanges = ["set", "forget", "mode", "mark", "stop", "answer", "download", "replay", "replayed"];
 
 export class FakeServer {
   /** `pictures`: from pictures.mjs. `running_s`: how long the run has lasted at the first hello. */
@@ -73,6 +73,8 @@ export class FakeServer {
 
   serve(request, response) {
     this.requests.push(request.url);
+    if (request.url.startsWith("/frozen/"))
+      return response.writeHead(200, { "Content-Type": "application/octet-stream" }).end("a record");
     const file = request.url === "/" ? "index.html" : request.url.slice(1);
     if (!kTypes[file]) return response.writeHead(404).end();
     response.writeHead(200, {

@@ -6,6 +6,12 @@ const kLateEvery = 50; // jobs of stereo
 
 export class RunModel {
   constructor(graph) {
+    this.frozen_files = [
+      { file: "ace-2-mark.mcap", mb: 241.04, at: 1.7e9 },
+      { file: "ace-1-miss.mcap", mb: 3.2, at: 1.6e9 },
+    ];
+    this.replayed = [];
+    this.replay_end = { state: "ended", why: "the record is damaged" };
     this.graph = graph;
     this.mode = graph.modes[0];
     this.parameters = [
@@ -135,6 +141,11 @@ export class RunModel {
     if (what === "stop") return { ok: true };
     if (what === "answer") return { ok: true };
     if (what === "fault") return this.fault(question);
+    if (what === "frozen") return { ok: true, folder: "/out/flight/frozen", files: this.frozen_files };
+    if (what === "download") return { ok: true, path: `/frozen/${question.file}?ticket=abc` };
+    if (what === "replay") return ((this.replayed = [{ state: "starting" }, { state: "starting" }]), { ok: true });
+    if (what === "replayed")
+      return { ok: true, file: this.frozen_files[0].file, ...(this.replayed.shift() ?? this.replay_end) };
     if (what !== "mode") return { error: `unknown question ${what}` };
     if (!this.graph.modes.includes(mode)) return { error: `this run cannot change to \`${mode}\`` };
     this.mode = mode;
