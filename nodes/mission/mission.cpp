@@ -16,8 +16,17 @@ constexpr double kStands_m_s = 0.02, kGotOn_m = 0.3;
 constexpr double kLooksThere_rad = 0.35, kLookOn_rad = 1.0, kAllAround_rad = 2 * std::numbers::pi;
 constexpr std::array kLeaderLooks_rad{0.7, -1.4, 2.1, -2.8, 1.4};  // left, right, farther left, right, ahead
 
-constexpr std::array<std::string_view, 11> kStates{"seek",  "look", "ask",    "back", "read",  "turn",
-                                                   "drive", "face", "follow", "done", "failed"};
+constexpr std::array<std::string_view, 12> kStates{"seek", "look",  "ask",  "back",   "read", "confirm",
+                                                   "turn", "drive", "face", "follow", "done", "failed"};
+
+/// What the screen has for directions, seen by whoever stands behind the robot and looks where it looks.
+struct Touched {
+  std::string_view answer, words;
+  double left_rad;
+};
+constexpr std::array<Touched, kMostTouched> kTouched{{{"left", "to the left", std::numbers::pi / 2},
+                                                      {"ahead", "straight on", 0},
+                                                      {"right", "to the right", -std::numbers::pi / 2}}};
 
 template <class To>  // a pose or a place
 double distance_m(const PlanarPose& from, const To& to) {
@@ -54,6 +63,7 @@ void Mission::enter(State state) {
 void Mission::fail(std::string_view trouble) {
   trouble_size_ = trouble.copy(trouble_.data(), trouble_.size());
   tell("stop");
+  say("I cannot go on: {}", trouble);
   enter(State::failed);
 }
 
@@ -63,10 +73,18 @@ void Mission::tell(const char* format, const Values&... values) {
   size_ = std::min(text_.size(), fmt::format_to_n(text_.data(), text_.size(), fmt::runtime(format), values...).size);
 }
 
+template <class... Values>
+void Mission::say(const char* format, const Values&... values) {
+  speech_size_ =
+      std::min(speech_.size(), fmt::format_to_n(speech_.data(), speech_.size(), fmt::runtime(format), values...).size);
+}
+
 void Mission::step(const Percept& percept) {
   now_ns_ = percept.now_ns;
+  speech_size_ = 0;
   const bool over = percept.over == number_;
   if (!percept.pedestrian.empty()) pedestrian_ = percept.pedestrian_at;
+  if (!percept.answer.empty() && answered(percept)) return;
   switch (state_) {
     case State::seek: return seek(percept);
     case State::look:
@@ -82,8 +100,10 @@ void Mission::step(const Percept& percept) {
     case State::back:
       if (!over) return;
       read_ = 0;
+      say("Which way do I go, please?");
       return enter(State::read);
     case State::read: return read(percept);
+    case State::confirm: return confirm(percept);
     case State::turn:
       if (!over) return;
       began_ = percept.robot;
@@ -120,10 +140,42 @@ void Mission::seek(const Percept& percept) {
   enter(State::look);
 }
 
+/// Whoever touches the screen need not be seen. Where the robot is led or has a way, only `stop` counts.
+bool Mission::answered(const Percept& percept) {
+  if (percept.answer == "stop" && state_ != State::done && state_ != State::failed) {
+    fail("told to stop at the screen");
+    return true;
+  }
+  const auto* touched = std::ranges::find(kTouched, percept.answer, &Touched::answer);
+  if (touched == kTouched.end() || (state_ > State::confirm && state_ != State::failed)) return false;
+  touched_ = static_cast<size_t>(touched - kTouched.begin());
+  trouble_size_ = 0;
+  tell("stop");
+  say("Do I go {}?", touched->words);
+  enter(State::confirm);
+  return true;
+}
+
+void Mission::confirm(const Percept& percept) {
+  const Touched& touched = kTouched[touched_];
+  if (percept.answer == "yes") {
+    direction_rad_ = wrapped(percept.robot.theta_rad + touched.left_rad);
+    say("Thank you. I go {}.", touched.words);
+    return turn_to_direction(percept.robot, State::turn);
+  }
+  if (percept.answer == "no") {
+    read_ = 0;
+    say("Which way, then?");
+    return enter(State::read);
+  }
+  if (since_s(entered_ns_) >= parameters_.confirm_within_s) enter(State::seek);
+}
+
 void Mission::read(const Percept& percept) {
   if (percept.pointed_rad) readings_rad_[read_++] = *percept.pointed_rad;
   if (read_ >= parameters_.readings) {
     direction_rad_ = middle_direction(std::span(readings_rad_).first(read_));
+    say("Thank you. I go there.");
     return turn_to_direction(percept.robot, State::turn);
   }
   if (since_s(entered_ns_) < parameters_.read_within_s) return;
@@ -143,6 +195,7 @@ void Mission::drive(const Percept& percept, bool over) {
   const bool last = crossed_ == parameters_.crossings;
   if (last && distance_m(percept.robot, began_) >= parameters_.beyond_m) {
     tell("stop");
+    say("I am there.");
     return enter(State::done);
   }
   // Seen now and then as the robot comes nearer, and not any more from close by.
@@ -153,6 +206,7 @@ void Mission::drive(const Percept& percept, bool over) {
     if (sign_m <= parameters_.stop_before_m) {
       waiting_ns_ = now_ns_;
       leader_looks_ = 0;
+      say("Please lead me across. I follow a chessboard shirt.");
       return turn_to_direction(percept.robot, State::face);
     }
   }

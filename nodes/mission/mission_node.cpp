@@ -36,8 +36,8 @@ class MissionNode final : public Node {
     set_nodes(VisionState::pose, pose_nodes_);
     set_nodes(VisionState::tracking, tracking_nodes_);
     requests_.reserve({0, 0, 1, static_cast<uint32_t>(std::max<size_t>(1, paced_.size()))});
-    for (OutputPort* text :
-         {static_cast<OutputPort*>(&task_), static_cast<OutputPort*>(&wanted_), static_cast<OutputPort*>(&status_)})
+    for (OutputPort* text : {static_cast<OutputPort*>(&task_), static_cast<OutputPort*>(&wanted_),
+                             static_cast<OutputPort*>(&status_), static_cast<OutputPort*>(&speech_)})
       text->reserve({0, 0, 1, kCharacters});
   }
 
@@ -54,7 +54,8 @@ class MissionNode final : public Node {
     Requests* requests = requests_.loan();
     if (!task || !wanted || !status || !requests) return job.no_result();
     const State before = mission_->state();
-    if (!odometry_.empty() && !odometry_.stale()) step(job.release_ns());
+    const bool stepped = !odometry_.empty() && !odometry_.stale();
+    if (stepped) step(job.release_ns());
     if (mission_->state() != before) say(job);
 
     const MissionTask told = mission_->task();
@@ -69,9 +70,15 @@ class MissionNode final : public Node {
     requests_.send(job.release_ns());
     tell(*status);
     status_.send(job.release_ns());
+    if (const std::string_view speech = mission_->speech(); stepped && !speech.empty()) {
+      TextStatus* said = speech_.loan();
+      if (!said) return job.no_result();
+      write(speech, said->text);
+      speech_.send(job.release_ns());
+    }
   }
 
-  void remember(StateArchive& archive) override { TAKT_STATE(archive, mission_); }
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, mission_, answered_); }
 
  private:
   /// A node that runs in one state of vision only.
@@ -126,7 +133,17 @@ class MissionNode final : public Node {
               grid->origin_y_m + grid->grid_in_map.y};
       percept.grid = &view;
     }
+    percept.answer = new_answer();
     mission_->step(percept);
+  }
+
+  /// What was touched since the last step. What had been touched before the first one belongs to an earlier mission.
+  std::string_view new_answer() {
+    const RobotTask* answer = answers_.newest();
+    if (answer == nullptr || answered_ == answer->number) return {};
+    const bool first = !answered_;
+    answered_ = answer->number;
+    return first ? std::string_view{} : std::string_view{answer->text.data(), answer->text.size};
   }
 
   /// The nearest one, and where he points.
@@ -208,10 +225,14 @@ class MissionNode final : public Node {
                       Need::optional};
   Input<Grid> grid_{this, "grid", "of the ground: what is occupied is no pavement; axes of the map frame"};
   Input<RobotTask> taken_{this, "taken", "of the robot client: its newest task, without text when it is over"};
+  Input<RobotTask> answers_{this, "answers",
+                            "touched on the robot's screen: left, ahead, right; yes, no; stop; of an interaction",
+                            Need::optional};
   Output<RobotTask> task_{this, "task", "for the robot client, with every job"};
   Output<TextStatus> wanted_{this, "wanted", "search, pose or tracking, for drive_arbiter; with every job"};
   Output<Requests> requests_{this, "requests", "nodes that this state of vision does not need; with every job"};
   Output<TextStatus> status_{this, "status", "one line: state, task or trouble, crossings, direction"};
+  Output<TextStatus> speech_{this, "speech", "what it says to who stands before it, when it does"};
   Param<std::string> pedestrian_{this, "pedestrian", "human", "", "type of those that can be asked"};
   Param<std::string> search_nodes_{this,        "search_nodes", "", "", "nodes that run in the state search only",
                                    kSizesMemory};
@@ -233,6 +254,7 @@ class MissionNode final : public Node {
   Param<double> clearance_{this, "clearance", 0.75, {0.3, 2.0}, "m", "by which what is no pavement is kept off"};
 
   std::optional<Mission> mission_;
+  std::optional<uint32_t> answered_;  ///< number of the newest answer that was looked at
   std::vector<Paced> paced_;
 };
 

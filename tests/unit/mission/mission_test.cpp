@@ -55,7 +55,13 @@ struct Town {
     mission.step(percept);
     percept.pointed_rad.reset();
     percept.sign.reset();
+    percept.answer = {};
   }
+  void touch(std::string_view answer) {
+    percept.answer = answer;
+    step();
+  }
+  std::string_view said() const { return mission.speech(); }
   /// Straight before the robot.
   void see_sign(double m) {
     const PlanarPose at = compose(percept.robot, {m, 0, 0});
@@ -203,6 +209,85 @@ TEST_CASE("who does not point is asked again, three times") {
   CHECK(town.told() == "stop");
 }
 
+TEST_CASE("whoever touches a direction on the screen is asked whether it was understood") {
+  Town town;
+  town.percept.robot.theta_rad = -90 * kDegree;
+  town.touch("yes");
+  CHECK(town.mission.state() == State::seek);  // nobody was asked anything
+  town.touch("left");
+  CHECK(town.mission.state() == State::confirm);
+  CHECK(town.told() == "stop");
+  CHECK(town.said() == "Do I go to the left?");
+  town.step();
+  CHECK(town.said() == "");
+  town.touch("no");
+  CHECK(town.mission.state() == State::read);
+  CHECK(town.said() == "Which way, then?");
+  town.touch("right"), town.touch("ahead");
+  CHECK(town.said() == "Do I go straight on?");
+  town.touch("left"), town.touch("yes");
+  CHECK(town.said() == "Thank you. I go to the left.");
+  REQUIRE(town.mission.direction_rad().has_value());
+  CHECK(*town.mission.direction_rad() == doctest::Approx(0).epsilon(1e-9));
+  CHECK(town.told() == "rotate 1.571");
+  town.touch("right");
+  CHECK(town.mission.state() == State::turn);  // it has its way
+  town.obey(), town.step();
+  CHECK(town.mission.state() == State::drive);
+}
+
+TEST_CASE("a direction that nobody confirms is none; each one is understood while a pedestrian is asked, too") {
+  Town town;
+  town.touch("ahead");
+  town.step(14.7);
+  CHECK(town.mission.state() == State::confirm);
+  town.step(0.3);
+  CHECK(town.mission.state() == State::seek);
+  CHECK_FALSE(town.mission.direction_rad().has_value());
+  town.percept.pedestrian = "anna";
+  town.step();
+  REQUIRE(town.mission.state() == State::ask);
+  for (const auto& [answer, rad] : {std::pair{"left", 90 * kDegree}, {"ahead", 0.0}, {"right", -90 * kDegree}}) {
+    Town asked = town;
+    asked.touch(answer), asked.touch("yes");
+    CHECK(asked.mission.state() == State::turn);
+    CHECK(*asked.mission.direction_rad() == doctest::Approx(rad));
+  }
+}
+
+TEST_CASE("stop on the screen ends the mission wherever it is, and a direction takes it up again") {
+  for (int steps = 0; steps < 4; ++steps) {
+    Town town;
+    if (steps > 0) town.ask_the_way(0), town.obey(), town.step();
+    if (steps > 1) town.see_sign(2), town.step(), town.obey(), town.step();
+    if (steps > 2) town.percept.leader = false, town.step(5);
+    town.touch("stop");
+    CHECK(town.mission.state() == State::failed);
+    CHECK(town.told() == "stop");
+    CHECK(town.mission.trouble() == "told to stop at the screen");
+    CHECK(town.said() == "I cannot go on: told to stop at the screen");
+    const uint32_t number = town.mission.task().number;
+    town.touch("stop");
+    CHECK(town.mission.task().number == number);
+    town.touch("ahead");
+    CHECK(town.mission.state() == State::confirm);
+    CHECK(town.mission.trouble().empty());
+  }
+}
+
+TEST_CASE("while it is led, no direction is taken from the screen") {
+  Town town;
+  town.ask_the_way(0);
+  town.obey(), town.step();
+  town.see_sign(2), town.step();
+  CHECK(town.said() == "Please lead me across. I follow a chessboard shirt.");
+  town.touch("left");
+  CHECK(town.mission.state() == State::face);
+  town.obey(), town.step();
+  town.touch("left");
+  CHECK(town.mission.state() == State::follow);
+}
+
 TEST_CASE("where no free ground leads on the mission fails; nobody leads across: too") {
   Town closed;
   closed.ground.fill(1, -10, 2, 10, 1000);
@@ -266,6 +351,7 @@ TEST_CASE("steps of a mission allocate nothing") {
   for (int i = 0; i < 8; ++i) town.percept.pointed_rad = 0, town.step();
   town.ended = town.mission.task().number, town.step(), town.step();
   CHECK(town.mission.state() == State::drive);
+  town.touch("stop"), town.touch("left"), town.touch("yes");
   if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
 }
 
