@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "hal/camera/iidc/iidc_driver.hpp"
 #include "hal/camera/rig.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
@@ -36,10 +37,8 @@ std::unique_ptr<v4l2::FrameTrigger> trigger_of(Settings& settings, const Clock& 
 
 }  // namespace
 
-NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock,
-                            std::unique_ptr<v4l2::VideoDevice> video, std::unique_ptr<gpio::LineChip> chip) {
+tl::expected<v4l2::V4l2CameraSettings, DeviceError> read_camera(const DeviceConfig& config, Settings& settings) {
   v4l2::V4l2CameraSettings camera;
-  camera.path = settings.path("path", true).string();
   const auto file = settings.path("rig", true);
   if (settings.error()) return tl::unexpected(*settings.error());
   auto rig = load_rig(config.id, file);
@@ -60,13 +59,51 @@ NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, cons
   camera.transfer_s = settings.quantity("transfer", Dimension::time, camera.transfer_s);
   camera.gain = settings.quantity("gain", Dimension::number, camera.gain);
   camera.stamp_delay_s = settings.quantity("stamp_delay", Dimension::time, camera.stamp_delay_s);
-  camera.dmabuf = settings.flag("dmabuf", camera.dmabuf);
-  auto trigger = trigger_of(settings, clock, std::move(chip));
-  auto device = std::make_unique<v4l2::V4l2Camera>(
-      config.id, std::move(camera), video ? std::move(video) : std::make_unique<v4l2::KernelVideoDevice>(), clock,
-      std::move(trigger));
+  if (settings.error()) return tl::unexpected(*settings.error());
+  return camera;
+}
+
+NodeResult closed_camera(const DeviceConfig& config, Settings& settings, v4l2::V4l2CameraSettings camera,
+                         const Clock& clock, std::unique_ptr<v4l2::VideoDevice> video,
+                         std::unique_ptr<gpio::LineChip> chip) {
+  auto device = std::make_unique<v4l2::V4l2Camera>(config.id, std::move(camera), std::move(video), clock,
+                                                   trigger_of(settings, clock, std::move(chip)));
   if (const auto sound = device->check_settings(); !sound) return tl::unexpected(sound.error());
   return closed<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
+}
+
+NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock,
+                            std::unique_ptr<v4l2::VideoDevice> video, std::unique_ptr<gpio::LineChip> chip) {
+  const auto path = settings.path("path", true);
+  auto camera = read_camera(config, settings);
+  if (!camera) return tl::unexpected(camera.error());
+  camera->path = path.string();
+  camera->dmabuf = settings.flag("dmabuf", camera->dmabuf);
+  if (!video) video = std::make_unique<v4l2::KernelVideoDevice>();
+  return closed_camera(config, settings, std::move(*camera), clock, std::move(video), std::move(chip));
+}
+
+std::vector<SettingInfo> camera_settings(std::string_view driver, const SettingInfo& place, const SettingInfo& more) {
+  using enum SettingKind;
+  return {
+      place,
+      {"rig", driver, path, true, "YAML file with lens, size, baseline and mount"},
+      {"format", driver, text, false, "y16 (a Bumblebee), y8i, rgb3 (three sensors), yuyv or grey (side by side); y16"},
+      {"left", driver, count, false, "byte of a pixel, or half of a row, of the left eye; 1, 0 side by side"},
+      {"right", driver, count, false, "byte of a pixel, or half of a row, of the right eye; 0, 1 side by side"},
+      {"bayer", driver, text, false, "rggb, grbg, gbrg or bggr: debayered to BGR; none (stereo debayers better)"},
+      {"buffers", driver, count, false, "frames that wait in the kernel's driver; 4"},
+      {"exposure", driver, time, false, "exposure time; as the camera is set"},
+      {"longest_exposure", driver, time, false, "of an automatic exposure; a whole period of its rate"},
+      {"transfer", driver, time, false, "from the end of the exposure until the frame is here; a whole period"},
+      {"gain", driver, number, false, "gain in the camera's own steps; as the camera is set"},
+      {"stamp_delay", driver, time, false, "from the begin of the exposure to the device's stamp; 0s"},
+      {"trigger_line", driver, text, false,
+       "output of a GPIO chip that makes it expose, one pulse a job; none: its rate"},
+      {"trigger_chip", driver, path, false, "the chip of that line; /dev/gpiochip0", true},
+      {"trigger_pulse", driver, time, false, "so long the line is high, at most 1ms; 0.1ms"},
+      more,
+  };
 }
 
 }  // namespace takt::hal
@@ -89,32 +126,14 @@ void register_stereo_camera(hal::DeviceTypes& types) {
            {"unchanging_difference", "", number, false,
             "mean difference to the frame before, below which it repeats; 0.25"},
        }});
-  types.add(
-      "stereo_camera",
-      {"v4l2", "a stereo camera behind Video4Linux",
-       hal::hardware([](const hal::DeviceConfig& config, Settings& settings, hal::Devices&, const Clock& clock) {
-         return hal::make_v4l2_camera(config, settings, clock, nullptr, nullptr);
-       })},
-      {
-          {"path", "v4l2", path, true, "device file, for instance /dev/video0", true},
-          {"rig", "v4l2", path, true, "YAML file with lens, size, baseline and mount"},
-          {"format", "v4l2", text, false,
-           "y16 (a Bumblebee), y8i, rgb3 (three sensors), yuyv or grey (side by side); y16"},
-          {"left", "v4l2", count, false, "byte of a pixel, or half of a row, of the left eye; 1, 0 side by side"},
-          {"right", "v4l2", count, false, "byte of a pixel, or half of a row, of the right eye; 0, 1 side by side"},
-          {"bayer", "v4l2", text, false, "rggb, grbg, gbrg or bggr: debayered to BGR; none (stereo debayers better)"},
-          {"buffers", "v4l2", count, false, "frames that wait in the kernel's driver; 4"},
-          {"exposure", "v4l2", time, false, "exposure time; as the camera is set"},
-          {"longest_exposure", "v4l2", time, false, "of an automatic exposure; a whole period of its rate"},
-          {"transfer", "v4l2", time, false, "from the end of the exposure until the frame is here; a whole period"},
-          {"gain", "v4l2", number, false, "gain in the camera's own steps; as the camera is set"},
-          {"stamp_delay", "v4l2", time, false, "from the begin of the exposure to the device's stamp; 0s"},
-          {"trigger_line", "v4l2", text, false,
-           "output of a GPIO chip that makes it expose, one pulse a job; none: its rate"},
-          {"trigger_chip", "v4l2", path, false, "the chip of that line; /dev/gpiochip0", true},
-          {"trigger_pulse", "v4l2", time, false, "so long the line is high, at most 1ms; 0.1ms"},
-          {"dmabuf", "v4l2", flag, false, "buffers are exported as DMABUFs for import; false"},
-      });
+  types.add("stereo_camera",
+            {"v4l2", "a stereo camera behind Video4Linux",
+             hal::hardware([](const hal::DeviceConfig& config, Settings& settings, hal::Devices&, const Clock& clock) {
+               return hal::make_v4l2_camera(config, settings, clock, nullptr, nullptr);
+             })},
+            hal::camera_settings("v4l2", {"path", "v4l2", path, true, "device file, for instance /dev/video0", true},
+                                 {"dmabuf", "v4l2", flag, false, "buffers are exported as DMABUFs for import; false"}));
+  hal::add_iidc_camera(types);
 }
 
 }  // namespace takt

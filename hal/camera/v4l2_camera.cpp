@@ -206,6 +206,9 @@ DeviceResult V4l2Camera::told(const Trouble& trouble) {
     case ENXIO: return device_failure(id_, what, "plug the camera in, or name another: takt devices");
     case EBUSY: return device_failure(id_, what, "end the program that holds it: fuser " + settings_.path);
     case EACCES: return device_failure(id_, what, "join the group video, or run as root");
+    case ELIBACC: return device_failure(id_, what, "install the library of FireWire cameras: apt install libdc1394-25");
+    case ENOTUNIQ: return device_failure(id_, what, "say with `guid` which of the cameras it is: takt devices");
+    case ENOSPC: return device_failure(id_, what, "the bus is full: a lower rate, or another bus for other cameras");
     default: break;
   }
   const FrameLayout& layout = settings_.layout;

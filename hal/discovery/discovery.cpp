@@ -59,6 +59,17 @@ void find_cameras(const fs::path& root, std::vector<Found>& all) {
   }
 }
 
+/// On FireWire, which has no video4linux; the maker's stereo cameras call themselves Bumblebee.
+void find_firewire(const fs::path& root, std::vector<Found>& all) {
+  const fs::path folder = root / "sys/bus/firewire/devices";
+  for (const std::string& name : names_in(folder, "fw")) {
+    const std::string model = line_of(folder / name / "model_name"), guid = line_of(folder / name / "guid");
+    if (guid.size() != 18 || line_of(folder / name / "is_local") == "1") continue;
+    all.push_back({"/dev/" + name, "FireWire, " + line_of(folder / name / "vendor_name") + " " + model,
+                   "camera: {driver: iidc, guid: \"" + guid.substr(2) + "\", rig: rigs/NAME.yaml, format: y16}"});
+  }
+}
+
 void find_buses(const fs::path& root, std::vector<Found>& all) {
   const fs::path folder = root / "sys/class/net";
   for (const std::string& name : names_in(folder, "")) {
@@ -92,6 +103,7 @@ void find_serial_lines(const fs::path& root, std::vector<Found>& all) {
 std::vector<Found> discover(const fs::path& root) {
   std::vector<Found> all;
   find_cameras(root, all);
+  find_firewire(root, all);
   find_buses(root, all);
   find_chips(root, all);
   find_serial_lines(root, all);
