@@ -6,10 +6,12 @@ cost     the main graph with nobody, with `takt web` and nobody who looks, with 
          15 Hz: CPU of takt-web and of the supervisor, frames a second, memory
 stalled  eight clients, of which one never reads: memory of takt-web at the beginning and at the end, what the others get
 pairs    alternating runs without and with server and Chromium: misses, lateness p99 over both neighbours
-page     Chromium at the robot's view: pictures received and drawn a second, age at drawing
+page     Chromium at the robot's view, with the camera's pictures alone and with all panels: received and drawn a second, age
+         from the stamp to the drawing
 
 Needs node and npm (tests/tools/web_client); pairs and page need Chromium. Targets: 3 % of a core for each grey stream; 2 MB more with
-a stalled client; lateness within the null pairs and no more misses; age at drawing p50 50, p99 200 ms. Exit 1: one is missed."""
+a stalled client; lateness within the null pairs and no more misses; the camera's pictures alone: 15 of 15 drawn a second, from
+capture to drawn p50 50, p99 200 ms. Exit 1: one is missed."""
 import json
 import os
 import pathlib
@@ -153,19 +155,25 @@ def pairs(work, count=10, seconds=15):
 
 
 def page(work, seconds=20):
+    camera, met = "head_camera.pair/picture", True
     run = Run(work)
     web = Web(run)
-    before = cpu_s(web.pid)
-    seen = json.loads(node(work, "drawn.mjs", web.address, seconds).communicate()[0])
-    ages = sorted(seen["latency_ms"])
-    share = 100 * (cpu_s(web.pid) - before) / seen["seconds"]
-    for key, drawn in seen["drawn"].items():
-        print(f"{key}: {seen['received'].get(key, 0) / seen['seconds']:.2f} received, {drawn / seen['seconds']:.2f} drawn a second")
-    p50, p99 = ages[len(ages) // 2], ages[int(len(ages) * 0.99)]
-    print(f"age at drawing p50 {p50:.0f}, p99 {p99:.0f} ms of {len(ages)}; takt-web {share:.2f} % of a core")
+    for kind in ("picture", ""):
+        before = cpu_s(web.pid)
+        began = time.monotonic()
+        seen = json.loads(node(work, "drawn.mjs", web.address, seconds, kind).communicate()[0])
+        share = 100 * (cpu_s(web.pid) - before) / (time.monotonic() - began)
+        print(f"{'the camera alone' if kind else 'all panels'}: takt-web {share:.2f} % of a core")
+        for key, drawn in seen["drawn"].items():
+            ages = sorted(seen["latency_ms"].get(key, []))
+            if drawn == 0 or not ages: continue
+            p50, p99 = ages[len(ages) // 2], ages[int(len(ages) * 0.99)]
+            print(f"  {key}: {seen['received'].get(key, 0) / seen['seconds']:.2f} received, {drawn / seen['seconds']:.2f} drawn a second; "
+                  f"from stamp to drawn p50 {p50:.0f}, p99 {p99:.0f} ms of {len(ages)}")
+            if kind and key == camera: met = drawn / seen["seconds"] >= 14.9 and p50 <= 50 and p99 <= 200
     web.end()
     run.end()
-    return p50 <= 50 and p99 <= 200
+    return met
 
 
 def main():

@@ -34,7 +34,7 @@ for (const [i, view] of views.entries()) {
     out.drawn = {};
     for (const key of Object.keys(after.drawn)) out.drawn[key] = after.drawn[key] - (before.drawn[key] ?? 0);
     for (const key of Object.keys(after.received)) out.received[key] = after.received[key] - (before.received[key] ?? 0);
-    out.latency_ms = await page.evaluate(() => window.takt.latency_ms.slice());
+    out.latency_ms = await page.evaluate(() => structuredClone(window.takt.latency_ms));
   }
 }
 

@@ -21,7 +21,7 @@ export interface Screen {
   stop?(): void;
 }
 
-const kMost_hz: Record<Way, number> = { picture: 10, disparity: 8, cloud: 5, scan: 15, grid: 5, pose: 15, value: 4 };
+const kMost_hz: Record<Way, number> = { picture: 15, disparity: 8, cloud: 5, scan: 15, grid: 5, pose: 15, value: 4 };
 
 export class Panel {
   readonly root: HTMLElement;
