@@ -7,12 +7,11 @@
 #include "graph/cli/file_option.hpp"
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/set_option.hpp"
+#include "graph/command/bringup_command.hpp"
 #include "graph/command/check_command.hpp"
 #include "graph/language/overlay.hpp"
 
 namespace takt::command {
-namespace {
-
 void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOptions& load) {
   reads_file(app.add_option("graph", graph, "graph file (default graph/ace.yaml)"));
   app.add_option("--profile", load.profile, "sim | replay | robot, as the graph defines them");
@@ -24,6 +23,8 @@ void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOp
   app.add_option("--set", load.set, "node.param=value, repeatable");
   add_plugin_option(app, load.plugin_files);
 }
+
+namespace {
 
 /// For what runs or judges a graph as it will run: with the values that `takt set --keep` left for it.
 void add_overlay_option(CLI::App& app, graph::LoadOptions& load) {
@@ -137,6 +138,8 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
   run->add_flag("--require-rt", o.require_rt,
                 "exit 3 where the machine lacks what `takt doctor` checks for such a run");
+  run->add_flag("--brought-up", o.brought_up,
+                "exit 2 if a real base would drive and something of the robot was not tried with `takt bringup`");
   run->footer(
       "Example: takt run graph/kitti.yaml --html run.html\n"
       "Example: takt run --clock virtual --record run.mcap\n"
@@ -145,8 +148,10 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
       "A policy from the command line ends with exit 3 instead.");
   run->callback([&, how_long] {
     o.duration_asked = how_long->count() > 0;
-    exit_code =
-        plugins.supervise(graph_file(o.graph), o.load, [&](const Registry& known) { return run_graph(known, o); });
+    exit_code = plugins.supervise(graph_file(o.graph), o.load, [&](const Registry& known) {
+      const int code = o.brought_up ? may_drive(known, o) : int{kOk};
+      return code == kOk ? run_graph(known, o) : code;
+    });
   });
 }
 

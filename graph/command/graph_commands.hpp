@@ -32,6 +32,9 @@ struct GraphOptions {
 /// --plugin FILE.
 void add_plugin_option(CLI::App& app, std::vector<std::filesystem::path>& files);
 
+/// The graph, and what of it: profile, schedule, mode, parameters.
+void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOptions& load);
+
 /// Adds the commands; each loads the plug-ins of its graph, and sets the exit code.
 void add_graph_commands(CLI::App& app, plugin::Plugins& plugins, GraphOptions& options, int& exit_code);
 

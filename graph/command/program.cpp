@@ -9,6 +9,7 @@
 #include "graph/cli/boundary.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
+#include "graph/command/bringup_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/command/log_commands.hpp"
@@ -60,6 +61,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   NewOptions project;
   ServiceOptions service;
   MachineOptions machine;
+  BringupOptions bringup;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
@@ -69,6 +71,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_new(app, project, exit_code);
   add_service_commands(app, service, exit_code);
   add_machine(app, machine, exit_code);
+  add_bringup(app, plugins, bringup, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);
   if (argc > 1 && argv[1][0] != '-' && std::find(own.begin(), own.end(), argv[1]) == own.end())

@@ -38,6 +38,7 @@ int load(const RunOptions& options, Prepared& prepared) {
   graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, prepared.registry);
   if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
+  if (options.alter) options.alter(*prepared.graph);
   tell_kept(*prepared.graph);
   if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);
   else prepared.clock = std::make_unique<MonotonicClock>();

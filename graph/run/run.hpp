@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -49,9 +50,11 @@ struct RunOptions {
   std::shared_ptr<WebBeside> shown;       ///< that; by run_graph(), begun once the run is admitted
   bool keep_ring = false;                 ///< what that comes to; by run_graph()
   uint64_t seed = 1;
-  std::filesystem::path watchdog;       ///< device that resets the machine unless the run is well; empty: none
-  int watchdog_timeout_s = 10;          ///< asked of it
-  RunWitness* witness = nullptr;        ///< asks for `clock` virtual
+  std::filesystem::path watchdog;  ///< device that resets the machine unless the run is well; empty: none
+  int watchdog_timeout_s = 10;     ///< asked of it
+  RunWitness* witness = nullptr;   ///< asks for `clock` virtual
+  bool brought_up = false;         ///< drives only what somebody tried, see graph/bringup; by who calls run_graph()
+  std::function<void(graph::GraphSpec&)> alter = {};  ///< of the graph that is loaded, before it is composed
   std::shared_ptr<RunOutputs> outputs;  ///< the files above, as long as the run has them; made by run_graph()
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
   bool policy_required() const { return require_rt || !load.policy.empty(); }

@@ -1,0 +1,3 @@
+# SPDX-License-Identifier: Apache-2.0
+set(ROOM_LABEL nodes)  # links every processing node
+set(ROOM_TEST_LIBRARIES takt_ace)
