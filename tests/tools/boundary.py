@@ -43,6 +43,7 @@ WHOLE = {
     "report": f"REPORT {GRAPH} --html NEW",
     "explain": "TRACE",
     "nodes": "obstacle_stop",
+    "bringup": f"{GRAPH} --profile doubles --doubles --device front_laser --output OUT",
     "doctor": "",
     "replay": "RECORD --output OUT",
     "bisect": 'RECORD {"port":"obstacle_stop.stop","field":"reasons","at_least":0}',
@@ -96,7 +97,7 @@ INSTEAD = {
     ("calibrate lasers", "--picture"): "SWEEPS",
     ("objects tune", "--roc"): "SOURCE/graph/objects --scenes 1 --object red_box",
 }
-SLOW = {"eval sift", "eval signs", "eval obstacle_stop", "eval stereo", "eval ego_motion", "eval objects", "eval objects3d", "eval body_pose", "eval person_tracking", "profile",
+SLOW = {"eval sift", "eval signs", "eval obstacle_stop", "eval stereo", "eval ego_motion", "eval objects", "eval objects3d", "eval body_pose", "eval person_tracking", "profile", "bringup",
         "eval registration", "eval ground", "eval terrain", "eval scan_matching", "eval mapping", "calibrate lasers",
         "calibrate rig", "terrain learn", "train cascade", "objects tune", "doctor", "bench"}
 # Without a run that is attached to, or a right input, they come to no output: the name of the run or the input is at fault.
