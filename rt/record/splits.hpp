@@ -17,8 +17,7 @@ class Splits {
   virtual mcap::Sink* next(int64_t at_ns) = 0;
   /// Whether the file ends here: it has `bytes`, and goes from `began_ns` to `at_ns`.
   virtual bool ends(uint64_t bytes, int64_t began_ns, int64_t at_ns) const = 0;
-  /// The file has what was published until `at_ns`, and keeps it through a loss of power. About once a second of the
-  /// run.
+  /// The file has what was published until `at_ns`, and keeps it through a loss of power. With each chunk.
   virtual mcap::Writer::Done settle(int64_t at_ns) = 0;
 };
 
