@@ -60,16 +60,16 @@ def main():
     bad = 0
     try:
         for first in range(0, count, A_RUN):
-            bad += one_run(graph, range(first, min(count, first + A_RUN)))
+            with tempfile.TemporaryDirectory(prefix="frozen") as work:
+                bad += one_run(graph, range(first, min(count, first + A_RUN)), pathlib.Path(work))
     finally:
         graph.unlink()
     print(f"{count - bad} of {count} frozen, named and replayed")
     return 1 if bad else 0
 
 
-def one_run(graph, numbers):
+def one_run(graph, numbers, work):
     """How many of them are not as they should be; all, if the run ends or its ring grows too large."""
-    work = pathlib.Path(tempfile.mkdtemp(prefix="frozen"))
     done = []
     with open(work / "log", "w") as log:
         run = subprocess.Popen([takt, "run", str(graph), "--for", "0s", "--ring", "on", "--output", str(work / "out"),

@@ -50,8 +50,7 @@ def plant(work, out):
     return good
 
 
-def main():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="rewind"))
+def main(work):
     record, out = str(work / "run.mcap"), str(work / "out")
     made = run("run", graph, "--clock", "virtual", "--for", f"{minutes * 60}s", "--record", record, "--output", out)
     print(f"{graph}: {minutes} minutes, {os.path.getsize(record) / 1e6:.0f} MB, run exit {made.returncode}", flush=True)
@@ -75,4 +74,5 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with tempfile.TemporaryDirectory(prefix="rewind") as folder:
+        sys.exit(main(pathlib.Path(folder)))

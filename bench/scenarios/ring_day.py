@@ -33,8 +33,7 @@ def write_graph(folder):
     return nodes
 
 
-def main():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="ring_day"))
+def main(work):
     nodes = write_graph(work)
     ring = work / "out/flight/ring"
     sizes = Sizes(ring, {"disk": megabytes})
@@ -61,4 +60,5 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with tempfile.TemporaryDirectory(prefix="ring_day") as folder:
+        sys.exit(main(pathlib.Path(folder)))

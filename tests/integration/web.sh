@@ -24,7 +24,7 @@ serve --token-file "$work/token"
 expect 3 "fix: another --port" "$takt" web --port $port
 
 echo "=== before there is a run, and with one"
-python3 - $port <<'PY' || fail "the page"
+python3 - $port "$source/graph/web/page/bundle" <<'PY' || fail "the page"
 import http.client, sys
 def get(path, **headers):
     connection = http.client.HTTPConnection("127.0.0.1", int(sys.argv[1]), timeout=10)
@@ -34,7 +34,9 @@ def get(path, **headers):
 status, policy, page = get("/")
 assert status == 200 and b"page.js" in page, page
 assert "default-src 'none'" in policy and "unsafe" not in policy, policy
-for path in ("/page.js", "/page.css"): assert get(path)[0] == 200, path
+for path, name in (("/", "index.html"), ("/page.js", "page.js"), ("/page.css", "page.css")):
+    status, _, content = get(path)
+    assert status == 200 and content == open(f"{sys.argv[2]}/{name}", "rb").read(), path  # and not of another version
 for path in ("/../etc/passwd", "/page"): assert get(path)[0] == 404, path
 assert get("/", Host="evil.example")[0] == 403
 PY
