@@ -176,12 +176,7 @@ command::RunOptions trial(const TrialOptions& options, const std::string& name,
   return run;
 }
 
-/// Waits for one thing that a person brings about; how long the base took to stand after `cause`.
-struct Stop {
-  std::string cause, failure;
-  double took_s = 0;
-};
-
+/// On the ground.
 class StopTrial {
  public:
   StopTrial(const TrialRun& run, const TrialOptions& options, const graph::GraphSpec& graph, const std::string& base)

@@ -12,8 +12,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <thread>
 
 #include "graph/web/gate.hpp"
 #include "rt/time/clock.hpp"
@@ -23,6 +25,7 @@ namespace {
 
 constexpr int64_t kTicketLasts_ns = 60'000'000'000;
 constexpr int kReplayLookMs = 100;
+constexpr int64_t kEnds_ns = 1'000'000'000;  ///< so long a replay may take to end
 constexpr size_t kMostSaid = 4096;  ///< at its end stands why it ended
 constexpr size_t kMostTickets = 16, kMostListed = 500;
 constexpr std::string_view kPath = "/frozen/";
@@ -117,7 +120,13 @@ void ReplayBeside::listen(int from) {
 }
 
 void ReplayBeside::end() {
-  if (process_ != 0) kill(process_, SIGTERM);
+  const auto ended = [this] { return told()["state"] == "ended"; };
+  if (process_ != 0 && !ended()) kill(process_, SIGTERM);
+  // Questions to the robot wait meanwhile.
+  for (int64_t until_ns = MonotonicClock().now_ns() + kEnds_ns; process_ != 0 && !ended();) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    if (MonotonicClock().now_ns() > until_ns) kill(process_, SIGKILL);
+  }
   if (thread_.joinable()) thread_.join();
   process_ = 0;
   std::error_code ignored;
