@@ -24,6 +24,7 @@ LEFT_OUT = [f"/usr/share/{name}/*" for name in ("doc", "info", "lintian", "local
     "drivers/mtd", "drivers/target", "drivers/scsi/qla2xxx", "drivers/scsi/lpfc", "drivers/scsi/bfa", "drivers/scsi/be2iscsi", "drivers/bluetooth", "drivers/nfc",
     "drivers/video", "drivers/accel", "fs/ocfs2", "fs/gfs2", "fs/ceph", "fs/xfs", "fs/btrfs", "fs/nfs", "fs/nfsd", "fs/smb", "fs/cifs", "fs/ubifs", "fs/reiserfs", "fs/jfs", "fs/f2fs",
     "sound", "net/bluetooth", "net/mac80211", "net/wireless", "net/sctp", "net/tipc", "net/ceph", "net/openvswitch")]
+KEPT = "/usr/share/doc/*/copyright"  # of what is left out: whoever hands an image on owes them
 INITRAMFS = pathlib.Path(__file__).resolve().parents[1] / "initramfs"
 
 
@@ -57,7 +58,7 @@ def sources(mirror):
 
 def key(packages, arch, source_text):
     initramfs = [(str(file.relative_to(INITRAMFS)), file.read_text()) for file in sorted(INITRAMFS.rglob("*")) if file.is_file()]
-    content = json.dumps([SUITE, arch, sorted(packages), LEFT_OUT, initramfs, source_text])
+    content = json.dumps([SUITE, arch, sorted(packages), LEFT_OUT, KEPT, initramfs, source_text])
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
@@ -76,7 +77,7 @@ def build(debs, more, arch, mirror, fresh=False):
         part = pathlib.Path(work) / "base.tar.zst"
         tools.run(
             "mmdebstrap", "--mode=auto", "--variant=essential", f"--architectures={arch}", "--aptopt=Apt::Install-Recommends \"false\"",
-            f"--include={','.join(packages)}", *[f"--dpkgopt=path-exclude={path}" for path in LEFT_OUT],
+            f"--include={','.join(packages)}", *[f"--dpkgopt=path-exclude={path}" for path in LEFT_OUT], f"--dpkgopt=path-include={KEPT}",
             "--essential-hook=mkdir -p \"$1/etc/initramfs-tools\"", f"--essential-hook=sync-in {INITRAMFS} /etc/initramfs-tools",
             "--customize-hook=rm -rf \"$1\"/var/cache/apt/* \"$1\"/var/lib/apt/lists/* \"$1\"/etc/apt/sources.list* \"$1\"/boot/System.map*",
             SUITE, part, apt, env={**os.environ, "TMPDIR": work, "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH", "0")})
