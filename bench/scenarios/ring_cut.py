@@ -36,6 +36,13 @@ def mounted(image, at):
     return at
 
 
+def unmounted(place):
+    """Waits for that: the loop device of an image within it goes a little later."""
+    for _ in range(100):
+        if not os.path.ismount(place) or subprocess.run(["umount", str(place)], stderr=subprocess.DEVNULL).returncode == 0: return
+        time.sleep(0.1)
+
+
 def make_disk(work):
     """An ext4 image on an XFS that lies in a file itself; where both are mounted."""
     host = work / "host.img"
@@ -90,12 +97,12 @@ def main():
             record = work / "rescued.mcap"
             good = rescued(takt, after / "out/flight/ring", record) and is_good(takt, record, f"cut {number}", at_ns)
             bad += not good
-            do("umount", after)
+            unmounted(after)
             copy.unlink()
     finally:
         graph.unlink()
         for place in ("after", "disk", "host"):
-            subprocess.run(["umount", str(work / place)], stderr=subprocess.DEVNULL)
+            unmounted(work / place)
         shutil.rmtree(work)
     print(f"{times - bad} of {times} readable, no wrong byte")
     return 1 if bad else 0
