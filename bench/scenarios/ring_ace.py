@@ -3,7 +3,7 @@
 """The main graph with its ring for long: ring_ace.py [MINUTES] [MEGABYTES].
 
 Runs MINUTES (30) with a ring of MEGABYTES (2000) on disk. Its folders must never be larger than they may, nothing may be lost, and all
-files together must replay from a random instant as they were recorded. Exit 1 if one is not so.
+jobs between the first and the last one that it holds must be there. Exit 1 if one is not so.
 """
 import json
 import os
@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-from ring_sizes import Sizes
+from ring_sizes import Sizes, jobs_in
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
@@ -35,13 +35,9 @@ def main(work):
         misses = sum(node["deadline_misses"] for node in report["nodes"])
         print(f"run exit {done.returncode}, policy {report['policy_granted']}, {misses} misses, {len(report['flight']['frozen'])} frozen; "
               + ", ".join(f"{place}: lost {ring['lost']}, refused {ring['refused']!r}" for place, ring in rings.items()))
-        record = work / "all.mcap"
-        subprocess.run([takt, "log", "rescue", str(work / "out/flight/ring"), "-o", str(record)], check=True, capture_output=True)
-        at_s = minutes * 60 * 0.6
-        again = subprocess.run([takt, "replay", str(record), "--from", f"{at_s}", "--until", f"{at_s + 20}", "--compare",
-                                "--output", str(work / "again")], capture_output=True, text=True)
-        print(again.stdout.strip().splitlines()[-1] if again.stdout else again.stderr[-300:])
-        return 0 if within and lost == 0 and again.returncode == 0 else 1
+        jobs, missing = jobs_in(work / "out/flight/ring")
+        print(f"{jobs} jobs are in the ring, {missing} missing")
+        return 0 if within and lost == 0 and missing == 0 and jobs > 0 else 1
     finally:
         graph.unlink()
 

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 
-from ring_sizes import Sizes
+from ring_sizes import Sizes, jobs_in
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
@@ -50,11 +50,7 @@ def main(work):
     disk = report["flight"]["disk"]
     jobs = {node["name"]: node["completed"] for node in report["nodes"]}
     print(f"{hours:g} h in {took:.0f} s; {len(nodes)} loads, {sum(jobs.values())} jobs; {json.dumps(disk)}")
-    kept, missing = 0, 0
-    for file in sorted(ring.glob("*.mcap")):
-        info = json.loads(subprocess.run([takt, "log", "info", str(file), "--json"], capture_output=True, text=True).stdout)
-        kept += sum(node["jobs"] for node in info["nodes"])
-        missing += sum(node.get("missing", 0) for node in info["nodes"])
+    kept, missing = jobs_in(ring)
     print(f"{kept} jobs are in the ring, {missing} missing; lost and counted: {disk['lost']}")
     return 0 if good and disk["lost"] == 0 and missing == 0 and kept > 0 else 1
 

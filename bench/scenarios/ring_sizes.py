@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much the ring of a run takes, looked at from outside: for scenarios that keep one for long."""
+import json
+import os
 import pathlib
+import subprocess
 import threading
 
 
@@ -18,6 +21,17 @@ def size_mb(folder):
         except FileNotFoundError:  # it had to go for a newer one
             pass
     return total / 1e6
+
+
+def jobs_in(ring):
+    """How many jobs its files hold, and how many are missing between the first and the last one of each file."""
+    takt = os.environ.get("TAKT", str(pathlib.Path(__file__).resolve().parents[2] / "takt"))
+    kept = missing = 0
+    for file in sorted(ring.glob("*.mcap")):
+        info = json.loads(subprocess.run([takt, "log", "info", str(file), "--json"], capture_output=True, text=True).stdout)
+        kept += sum(node["jobs"] for node in info["nodes"])
+        missing += sum(node.get("missing", 0) for node in info["nodes"])
+    return kept, missing
 
 
 class Sizes(threading.Thread):
