@@ -166,13 +166,14 @@ int bring_up(const Registry& registry, const BringupOptions& options) {
 int may_drive(const Registry& registry, const RunOptions& options) {
   const graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, registry);
   if (!loaded.graph) return kOk;  // the run says what is wrong
-  const auto known = BroughtUp::read(file_of({}, loaded.graph->name));
+  const std::filesystem::path file = file_of({}, loaded.graph->name);
+  const auto known = BroughtUp::read(file);
   if (!known) return refuse(known.error(), kBadInput);
   std::string text;
   for (const std::string& lack : bringup::lacks(*loaded.graph, registry, *known)) text += "\n  " + lack;
   if (text.empty()) return kOk;
-  return refuse(fmt::format("--brought-up: {} may not drive yet:{}\n  fix: takt bringup {} --profile {}",
-                            loaded.graph->name, text, loaded.graph->file, loaded.graph->profile),
+  return refuse(fmt::format("--brought-up: {} may not drive yet:{}\n  fix: takt bringup {} --profile {} --file {}",
+                            loaded.graph->name, text, loaded.graph->file, loaded.graph->profile, file.string()),
                 kBadInput);
 }
 
