@@ -28,6 +28,7 @@ if(NOT DEFINED takt_NEEDS OR ace IN_LIST takt_NEEDS)
 endif()
 if(NOT DEFINED takt_NEEDS)
   find_package(doctest REQUIRED)
+  find_path(DC1394_INCLUDE dc1394/dc1394.h REQUIRED)  # its header alone: the library is loaded where a graph has such a camera
   pkg_check_modules(XXHASH REQUIRED libxxhash)  # its header alone: it is compiled in
   find_package(iceoryx_posh CONFIG REQUIRED)
   find_package(iceoryx_hoofs CONFIG REQUIRED)

@@ -19,7 +19,7 @@ import time
 
 from processes import alive, family
 from processes import name as process_name
-from ring_sizes import Sizes
+from ring_sizes import Sizes, main_graph
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
@@ -53,17 +53,12 @@ def inject(kind, number, run):
 
 
 def main():
-    graph = root / "graph" / f".frozen_{os.getpid()}.yaml"
-    kept = "record: {{before: 2s, after: 1s, frozen: 60GB, disk: {disk}MB, memory: {memory}MB}}".format(**LIMITS_MB)
-    graph.write_text("\n".join(kept if line.startswith("record:") else line
-                               for line in (root / "graph/ace.yaml").read_text().split("\n")))
     bad = 0
-    try:
+    rules = "before: 2s, after: 1s, frozen: 60GB, disk: {disk}MB, memory: {memory}MB".format(**LIMITS_MB)
+    with main_graph(rules) as graph:
         for first in range(0, count, A_RUN):
             with tempfile.TemporaryDirectory(prefix="frozen") as work:
                 bad += one_run(graph, range(first, min(count, first + A_RUN)), pathlib.Path(work))
-    finally:
-        graph.unlink()
     print(f"{count - bad} of {count} frozen, named and replayed")
     return 1 if bad else 0
 

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The main graph with its ring for long: ring_ace.py [MINUTES] [MEGABYTES].
 
-Runs MINUTES (30) with a ring of MEGABYTES (2000) on disk. Its folders must never be larger than they may, nothing may be lost, and all
-jobs between the first and the last one that it holds must be there. Exit 1 if one is not so.
+Runs MINUTES (30) with a ring of MEGABYTES (2000) on disk. Its folders must never be larger than they may, nothing may be lost, all jobs
+between the first and the last one that it holds must be there, and a replay from its middle must equal it. Exit 1 if one is not so.
+The last is not so today: on disk the ring has large states of nodes by hash only (graph/flight/README.md, Limits).
 """
 import json
 import os
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 
-from ring_sizes import Sizes, jobs_in
+from ring_sizes import Sizes, jobs_in, main_graph
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
@@ -20,12 +21,19 @@ minutes, megabytes = float((sys.argv[1:] or ["30"])[0]), int((sys.argv[2:] or ["
 MEMORY_MB = 660
 
 
+def differ(work):
+    """How many messages differ in a replay from the middle; nothing: none was compared."""
+    record = work / "all.mcap"
+    subprocess.run([takt, "log", "rescue", str(work / "out/flight/ring"), "-o", str(record)], check=True, capture_output=True)
+    at_s = minutes * 60 * 0.6
+    again = subprocess.run([takt, "replay", str(record), "--from", f"{at_s}", "--until", f"{at_s + 20}", "--compare",
+                            "--output", str(work / "again")], capture_output=True, text=True).stdout
+    return next((int(line.split()[-2]) for line in again.splitlines() if line.endswith(" differ") and line.startswith("compared")), None)
+
+
 def main(work):
-    graph = root / "graph" / f".ring_ace_{os.getpid()}.yaml"
-    rule = f"record: {{disk: {megabytes}MB, memory: {MEMORY_MB}MB}}"
-    graph.write_text("\n".join(rule if line.startswith("record:") else line for line in (root / "graph/ace.yaml").read_text().split("\n")))
     sizes = Sizes(work / "out/flight/ring", {"disk": megabytes, "memory": MEMORY_MB})
-    try:
+    with main_graph(f"disk: {megabytes}MB, memory: {MEMORY_MB}MB") as graph:
         done = subprocess.run([takt, "run", str(graph), "--for", f"{minutes * 60:.0f}s", "--output", str(work / "out"),
                                "--report", str(work / "report.json")], capture_output=True, text=True)
         within = sizes.kept_within()
@@ -36,10 +44,9 @@ def main(work):
         print(f"run exit {done.returncode}, policy {report['policy_granted']}, {misses} misses, {len(report['flight']['frozen'])} frozen; "
               + ", ".join(f"{place}: lost {ring['lost']}, refused {ring['refused']!r}" for place, ring in rings.items()))
         jobs, missing = jobs_in(work / "out/flight/ring")
-        print(f"{jobs} jobs are in the ring, {missing} missing")
-        return 0 if within and lost == 0 and missing == 0 and jobs > 0 else 1
-    finally:
-        graph.unlink()
+        different = differ(work)
+        print(f"{jobs} jobs are in the ring, {missing} missing; from its middle {different} messages differ")
+        return 0 if within and lost == 0 and missing == 0 and jobs > 0 and different == 0 else 1
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import tempfile
 import time
 
 from rescued import is_good, rescued
+from ring_sizes import main_graph
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
@@ -55,14 +56,6 @@ def make_disk(work):
     return image, mounted(image, work / "disk")
 
 
-def write_graph(work):
-    """The main graph with a ring that the disk has room for."""
-    graph = root / "graph" / f".ring_cut_{os.getpid()}.yaml"
-    graph.write_text("\n".join(f"record: {{disk: {RING_MB}MB, memory: 64MB, before: 1s, after: 0s, frozen: 50MB}}" if line.startswith("record:") else line
-                               for line in (root / "graph/ace.yaml").read_text().split("\n")))
-    return graph
-
-
 def cut_while_running(graph, image, disk, work):
     """Copies of the image, each with the instant just before it was made."""
     cuts = []
@@ -89,18 +82,18 @@ def main():
         print("NOT RUN: needs root (it mounts disk images) and xfsprogs")
         return 77
     work = pathlib.Path(tempfile.mkdtemp(prefix="ring_cut"))
-    graph, bad = write_graph(work), 0
+    bad = 0
     try:
         image, disk = make_disk(work)
-        for number, (copy, at_ns) in enumerate(cut_while_running(graph, image, disk, work), 1):
-            after = mounted(copy, work / "after")
-            record = work / "rescued.mcap"
-            good = rescued(takt, after / "out/flight/ring", record) and is_good(takt, record, f"cut {number}", at_ns)
-            bad += not good
-            unmounted(after)
-            copy.unlink()
+        with main_graph(f"disk: {RING_MB}MB, memory: 64MB, before: 1s, after: 0s, frozen: 50MB") as graph:
+            for number, (copy, at_ns) in enumerate(cut_while_running(graph, image, disk, work), 1):
+                after = mounted(copy, work / "after")
+                record = work / "rescued.mcap"
+                good = rescued(takt, after / "out/flight/ring", record) and is_good(takt, record, f"cut {number}", at_ns)
+                bad += not good
+                unmounted(after)
+                copy.unlink()
     finally:
-        graph.unlink()
         for place in ("after", "disk", "host"):
             unmounted(work / place)
         shutil.rmtree(work)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much the ring of a run takes, looked at from outside: for scenarios that keep one for long."""
+import contextlib
 import json
 import os
 import pathlib
@@ -21,6 +22,19 @@ def size_mb(folder):
         except FileNotFoundError:  # it had to go for a newer one
             pass
     return total / 1e6
+
+
+@contextlib.contextmanager
+def main_graph(rules):
+    """A copy of the main graph with these rules of `record`, beside it, for as long as that lasts."""
+    folder = pathlib.Path(__file__).resolve().parents[2] / "graph"
+    graph = folder / f".ring_{os.getpid()}.yaml"
+    graph.write_text("\n".join(f"record: {{{rules}}}" if line.startswith("record:") else line
+                               for line in (folder / "ace.yaml").read_text().split("\n")))
+    try:
+        yield graph
+    finally:
+        graph.unlink()
 
 
 def jobs_in(ring):

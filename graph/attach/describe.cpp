@@ -23,15 +23,6 @@ Json ms_or_null(std::optional<int64_t> ns) { return ns ? ms(*ns) : Json(nullptr)
 
 std::string name_of(const PortPlan& port) { return port.node + "." + port.port; }
 
-/// The type of a node, the kind of a device.
-std::string type_of(const Subject& subject, const std::string& id) {
-  for (const graph::NodeSpec& node : subject.graph.nodes)
-    if (node.id == id) return node.type;
-  for (const graph::DeviceSpec& device : subject.graph.devices)
-    if (device.id == id) return device.kind;
-  return "";
-}
-
 std::string process_of(const Subject& subject, size_t task) {
   return task < subject.process_of.size() ? subject.processes[subject.process_of[task]] : "";
 }
@@ -164,6 +155,14 @@ Json processes_json(const Subject& subject) {
 }
 
 }  // namespace
+
+std::string type_of(const Subject& subject, const std::string& id) {
+  for (const graph::NodeSpec& node : subject.graph.nodes)
+    if (node.id == id) return node.type;
+  for (const graph::DeviceSpec& device : subject.graph.devices)
+    if (device.id == id) return device.kind;
+  return "";
+}
 
 Json describe_json(const Subject& subject) {
   Json nodes = Json::array(), ports = Json::array(), chains = Json::array(), modes = Json::array(),

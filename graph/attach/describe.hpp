@@ -9,12 +9,16 @@
 // Times are seconds of the run. Any thread, one at a time for each object; reads the board alone.
 #pragma once
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "graph/attach/subject.hpp"
 #include "hal/settings/json.hpp"
 
 namespace takt::attach {
+
+/// The type of a node, the kind of a device; empty: there is none of that name.
+std::string type_of(const Subject& subject, const std::string& id);
 
 /// What stays as it is while the run goes on: nodes with their times and what was proven of them, ports with the layout
 /// of their messages, chains, modes, processes, parameters. See graph/web/README.md, `graph`.

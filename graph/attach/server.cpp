@@ -197,7 +197,7 @@ Json Server::top() const {
     const TaskPlan& task = subject_.plan.tasks[t];
     const TaskStatistics& s = subject_.board.task(t);
     nodes.push_back({{"name", task.name},
-                     {"type", type_of(task.name)},
+                     {"type", type_of(subject_, task.name)},
                      {"rate_hz", task.rate ? Json(task.rate->hz()) : Json(nullptr)},
                      {"completed", s.completed.load()},
                      {"deadline_misses", s.deadline_misses.load()},
@@ -219,12 +219,6 @@ Json Server::top() const {
           {"parameters", parameters_json(subject_.registry.nodes, subject_.graph, subject_.plan, subject_.board)},
           {"frozen", subject_.frozen ? subject_.frozen() : std::vector<std::string>{}},
           {"nodes", nodes}};
-}
-
-std::string Server::type_of(const std::string& node) const {
-  for (const graph::NodeSpec& spec : subject_.graph.nodes)
-    if (spec.id == node) return spec.type;
-  return "";
 }
 
 bool Server::echo(const Json& question, Connection& connection) {

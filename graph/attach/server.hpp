@@ -67,8 +67,6 @@ class Server {
   /// What somebody answered on the screen of `device`. Comes back once a job of the device has it.
   nlohmann::ordered_json give_answer(const std::string& device, const std::string& text, uint32_t by_user);
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
-  /// Of a node; "" of a device.
-  std::string type_of(const std::string& node) const;
   /// A replay's sockets are apart from those of runs.
   SocketFolder::Of whom() const {
     return subject_.replay_of.empty() ? SocketFolder::Of::run : SocketFolder::Of::replay;

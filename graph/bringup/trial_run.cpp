@@ -10,9 +10,9 @@
 #include <cstdio>
 #include <fstream>
 #include <stdexcept>
-#include <thread>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/run/member_process.hpp"
 
 namespace takt::bringup {
 
@@ -32,11 +32,8 @@ std::optional<attach::Connection> asked(pid_t run, const Json& question) {
 
 bool comes_to_be(double within_s, const std::function<bool()>& condition) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(within_s);
-  for (;;) {
-    if (condition()) return true;
-    if (std::chrono::steady_clock::now() >= until) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
+  return command::wait_until(
+      condition, [&] { return std::chrono::steady_clock::now() >= until; }, std::chrono::milliseconds(50));
 }
 
 TrialRun::TrialRun(const Registry& registry, const command::RunOptions& options, const std::filesystem::path& log)

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <fstream>
 #include <numbers>
 #include <thread>
 #include <vector>
 
 #include "graph/bringup/altered.hpp"
+#include "graph/check/figures_file.hpp"
 #include "rt/msg/ace/stop_command.hpp"
 
 namespace takt::bringup {
@@ -22,14 +22,6 @@ using Json = TrialRun::Json;
 
 constexpr double kStands_m_s = 0.02, kStops_s = 1.0, kDrives_s = 2.0;
 constexpr double kLeastShare = 0.8;  ///< of the messages that a device should have sent
-
-std::string now_utc() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
-                     utc.tm_hour, utc.tm_min, utc.tm_sec);
-}
 
 void wait_s(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
 
@@ -161,7 +153,9 @@ Verdict try_kind(const TrialRun& run, const TrialOptions& options, const graph::
   return {true, ""};
 }
 
-Trial noted(const std::string& of, const Verdict& verdict) { return {of, now_utc(), verdict.said, verdict.passed}; }
+Trial noted(const std::string& of, const Verdict& verdict) {
+  return {of, graph::utc_now(), verdict.said, verdict.passed};
+}
 
 /// The run of a trial, with what is to be different in it.
 command::RunOptions trial(const TrialOptions& options, const std::string& name,

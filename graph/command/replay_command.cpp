@@ -9,7 +9,6 @@
 #include <iostream>
 
 #include "graph/cli/file_option.hpp"
-#include "graph/cli/other_program.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/command/what_if_command.hpp"
 #include "graph/log/damages.hpp"
@@ -56,11 +55,9 @@ class Replay {
 
  private:
   int prepare_web() {
-    const std::string program = other_program("web").string();
-    if (program.empty())
-      return refuse("--web: takt-web is not there; `./takt web --help` of a checkout builds it (libwebsockets-dev)",
-                    kDeviceOrSystem);
-    web_.emplace(std::vector<std::string>{program, "--with-run", std::to_string(getpid()), "--port", "0"});
+    const auto program = web_program();
+    if (!program) return refuse(program.error(), kDeviceOrSystem);
+    web_.emplace(std::vector<std::string>{*program, "--with-run", std::to_string(getpid()), "--port", "0"});
     return kOk;
   }
 

@@ -95,7 +95,7 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
 
 Freezer::Options FlightRecorder::freezing(const graph::RecordSpec& spec, const Plan& plan, const std::string& run) {
   Freezer::Options freezing;
-  freezing.folder = options_.folder / "frozen";
+  freezing.folder = frozen_folder();
   freezing.name = run;
   freezing.before_ns = spec.before_ns;
   freezing.after_ns = spec.after_ns;

@@ -42,6 +42,7 @@ class FlightRecorder {
   FlightRecorder& operator=(const FlightRecorder&) = delete;
 
   const std::string& lacks() const { return lacks_; }
+  std::filesystem::path frozen_folder() const { return options_.folder / "frozen"; }
   /// What is kept may be less than was asked for, and why.
   const std::vector<std::string>& doubts() const { return doubts_; }
   /// As of record::Recorder.

@@ -113,7 +113,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
 }
 
 std::filesystem::path RunRecord::frozen_folder() const {
-  return flight_ ? std::filesystem::absolute(options_.output / "flight/frozen") : std::filesystem::path();
+  return flight_ ? std::filesystem::absolute(flight_->frozen_folder()) : std::filesystem::path();
 }
 
 record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan, const Transport& transport,

@@ -216,11 +216,9 @@ int run_as_asked(const Registry& registry, RunOptions options) {
       std::fprintf(stderr, "takt: note: %s\n", note.c_str());
   }
   if (options.web) {
-    const std::string program = other_program("web").string();
-    if (program.empty())
-      return refuse("--web: takt-web is not there; `./takt web --help` of a checkout builds it (libwebsockets-dev)",
-                    kDeviceOrSystem);
-    options.shown = std::make_shared<WebBeside>(web_arguments(program, prepared.graph->web));
+    const auto program = web_program();
+    if (!program) return refuse(program.error(), kDeviceOrSystem);
+    options.shown = std::make_shared<WebBeside>(web_arguments(*program, prepared.graph->web));
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(registry, options);

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "graph/cli/other_program.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {
@@ -80,6 +81,13 @@ tl::expected<void, std::string> WebBeside::begin() {
     return tl::make_unexpected(std::string("--web: takt-web did not start; without --web the run needs none"));
   std::fputs(said.c_str(), stderr);
   return {};
+}
+
+tl::expected<std::string, std::string> web_program() {
+  std::string program = other_program("web").string();
+  if (!program.empty()) return program;
+  return tl::make_unexpected(
+      std::string("--web: takt-web is not there; `./takt web --help` of a checkout builds it (libwebsockets-dev)"));
 }
 
 tl::expected<void, std::string> begin_web(const RunOptions& options) {

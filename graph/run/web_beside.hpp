@@ -29,6 +29,9 @@ class WebBeside {
   int go_ = -1, told_ = -1;  ///< pipes: to it, from its stdout
 };
 
+/// The file of `takt web`. Error: it is not there, with the way to get it.
+tl::expected<std::string, std::string> web_program();
+
 /// Of a run that is admitted; nothing to do where it is not to be shown.
 tl::expected<void, std::string> begin_web(const RunOptions& options);
 

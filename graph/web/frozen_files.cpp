@@ -26,15 +26,8 @@ namespace {
 constexpr int64_t kTicketLasts_ns = 60'000'000'000;
 constexpr int kReplayLookMs = 100;
 constexpr int64_t kEnds_ns = 1'000'000'000;  ///< so long a replay may take to end
-constexpr size_t kMostSaid = 4096;  ///< at its end stands why it ended
+constexpr size_t kMostSaid = 4096;           ///< at its end stands why it ended
 constexpr size_t kMostTickets = 16, kMostListed = 500;
-constexpr std::string_view kPath = "/frozen/";
-
-/// Null: not this word, or no text.
-std::string word(const Json& question, const char* key) {
-  const auto found = question.find(key);
-  return found != question.end() && found->is_string() ? found->get<std::string>() : "";
-}
 
 /// A process with stderr in a pipe, its other end in `from`; 0: it did not start.
 pid_t spawn(const std::vector<std::string>& words, int& from) {
@@ -142,15 +135,15 @@ Json ReplayBeside::told() const {
 }
 
 bool FrozenFiles::is_asked(const Json& question) {
-  const std::string what = word(question, "do");
+  const std::string what = text_of(question, "do");
   return what == "frozen" || what == "download" || what == "replay" || what == "replayed";
 }
 
 Json FrozenFiles::answer(const Json& question) {
-  const std::string what = word(question, "do");
+  const std::string what = text_of(question, "do");
   if (what == "frozen") return list();
   if (what == "replayed") return replay_.told();
-  const std::string name = word(question, "file");
+  const std::string name = text_of(question, "file");
   const auto file = find(name);
   if (!file) return {{"error", fmt::format("there is no frozen record `{}`", name)}};
   if (what == "download") return issue(*file);
@@ -194,7 +187,7 @@ Json FrozenFiles::list() const {
 Json FrozenFiles::issue(const std::filesystem::path& file) {
   const int64_t now_ns = MonotonicClock().now_ns();
   Ticket ticket{new_token(), file, now_ns + kTicketLasts_ns};
-  const std::string path = fmt::format("{}{}?ticket={}", kPath, file.filename().string(), ticket.secret);
+  const std::string path = fmt::format("{}{}?ticket={}", kFrozenPath, file.filename().string(), ticket.secret);
   const std::lock_guard lock(mutex_);
   std::erase_if(tickets_, [&](const Ticket& other) { return other.until_ns < now_ns; });
   if (tickets_.size() >= kMostTickets) tickets_.erase(tickets_.begin());

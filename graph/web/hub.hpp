@@ -16,6 +16,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -24,6 +25,15 @@
 namespace takt::web {
 
 using Json = nlohmann::ordered_json;
+/// A member that is a text. Empty: there is none, or it is something else.
+inline std::string text_of(const Json& of, const char* key) {
+  const auto found = of.find(key);
+  return found != of.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+/// Where a server has the frozen records of its run.
+inline constexpr std::string_view kFrozenPath = "/frozen/";
+
 /// What is sent as it is, to as many as want it.
 using Frame = std::shared_ptr<const std::string>;
 

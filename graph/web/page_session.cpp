@@ -25,14 +25,8 @@ bool among(const std::array<std::string_view, N>& words, std::string_view word) 
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-/// Empty: there is none, or it is no text.
-std::string text(const Json& of, const char* key) {
-  const auto found = of.find(key);
-  return found != of.end() && found->is_string() ? found->get<std::string>() : "";
-}
-
 bool needs_token(const Json& question) {
-  const std::string what = text(question, "do");
+  const std::string what = text_of(question, "do");
   return among(kChanges, what) || among(kFetches, what) || (what == "fault" && question.contains("fault"));
 }
 
@@ -46,10 +40,10 @@ class PageSession final : public Session {
   bool receive(std::string_view bytes, bool binary) override {
     const Json said = binary ? Json() : Json::parse(bytes, nullptr, false);
     if (!said.is_object()) return false;
-    const std::string op = text(said, "op");
-    if (op == "token") take_token(text(said, "token"));
+    const std::string op = text_of(said, "op");
+    if (op == "token") take_token(text_of(said, "token"));
     else if (op == "look") look_at(said);
-    else if (op == "leave") leave({text(said, "port"), text(said, "as")});
+    else if (op == "leave") leave({text_of(said, "port"), text_of(said, "as")});
     else if (op == "ask") ask(said);
     else return false;
     return true;
@@ -130,7 +124,7 @@ class PageSession final : public Session {
   }
 
   void look_at(const Json& said) {
-    const View view{text(said, "port"), text(said, "as")};
+    const View view{text_of(said, "port"), text_of(said, "as")};
     if (!may_look() || !among(kKinds, view.as) || looks_.size() >= kMostLooks || looks_.contains(view)) return;
     const Json hz = said.value("most_hz", Json(kScreenHz));
     Look& look = looks_[view];
@@ -152,7 +146,7 @@ class PageSession final : public Session {
     if (!question.is_object()) return refuse("a question is an object with `do`");
     if (needs_token(question) && !may_change_)
       return refuse("this needs the token: open the address that `takt web` printed");
-    if (!needs_token(question) && (!may_look() || !among(kLooks, text(question, "do"))))
+    if (!needs_token(question) && (!may_look() || !among(kLooks, text_of(question, "do"))))
       return refuse("the page may not ask that");
     room().ask(number(), question, [this, id](Json answer) {
       answer["op"] = "answer";

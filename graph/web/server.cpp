@@ -19,7 +19,6 @@ namespace {
 constexpr size_t kMostSessions = 32;
 constexpr size_t kLongestMessage = 64 << 10;  ///< from the other side
 constexpr const char* kPageProtocol = "takt.v1";
-constexpr std::string_view kFrozen = "/frozen/";
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' ws: wss:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -138,7 +137,7 @@ class Server::Inside {
   int answer_http(lws* connection, std::string_view path) {
     if (!gate_.host(header_of(connection, WSI_TOKEN_HOST)))
       return refuse(connection, HTTP_STATUS_FORBIDDEN, "not under this name");
-    if (path.starts_with(kFrozen)) return hand_out(connection, std::string(path.substr(kFrozen.size())));
+    if (path.starts_with(kFrozenPath)) return hand_out(connection, std::string(path.substr(kFrozenPath.size())));
     const PageFile* file = page_file(path);
     if (file == nullptr) return refuse(connection, HTTP_STATUS_NOT_FOUND, "there is no such page");
     std::array<unsigned char, LWS_PRE + 2048> buffer{};

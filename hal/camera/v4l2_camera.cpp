@@ -259,11 +259,11 @@ bool V4l2Camera::restart(int64_t) {
 
 DeclaredCalls V4l2Camera::declared_calls() const {
   const uint32_t colours = settings_.layout.mosaic == Mosaic::none ? 0 : bit(JobCall::malloc) | bit(JobCall::lock);
-  const uint32_t line = trigger_ ? bit(JobCall::malloc) : 0;
-  return {
-      bit(JobCall::wait) | bit(JobCall::file) | bit(JobCall::mmap) | colours | line,
-      "frames are waited for until the deadline, a lost device is opened again (libgpiod allocates then); OpenCV makes "
-      "the colours"};
+  const uint32_t line = trigger_ || device_->allocates() ? bit(JobCall::malloc) : 0;
+  return {bit(JobCall::wait) | bit(JobCall::file) | bit(JobCall::mmap) | colours | line,
+          "frames are waited for until the deadline, a lost device is opened again (libgpiod and libdc1394 allocate "
+          "then); OpenCV makes "
+          "the colours"};
 }
 
 SourceCounts V4l2Camera::counts() const {

@@ -25,6 +25,8 @@ class VideoDevice {
   virtual void unmap(std::span<const uint8_t> buffer) = 0;
   /// Until there is something to take, or the time is over: poll's `revents`.
   virtual short wait(int64_t timeout_ns) = 0;
+  /// Whether a device that is opened again takes memory from the heap.
+  virtual bool allocates() const { return false; }
 };
 
 /// A device file of this machine.

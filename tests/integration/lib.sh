@@ -58,12 +58,17 @@ start_run() {
   shift
   "$takt" run ${policy:+--policy "$policy"} --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
   run=$!
-  while kill -0 $run 2>/dev/null; do
-    "$takt" top --once --run $run >"$work/top" 2>/dev/null && return
+  attachable $run "$name"
+}
+
+# attachable PID NAME: waits until that run or replay can be asked.
+attachable() {
+  while kill -0 $1 2>/dev/null; do
+    "$takt" top --once --run $1 >"$work/top" 2>/dev/null && return
     sleep 0.1
   done
-  cat "$work/$name.err"
-  fail "run $name ended before it could be attached to"
+  cat "$work/$2.err"
+  fail "$2 ended before it could be attached to"
 }
 
 # The process NAME of the run. Over iceoryx there is a keeper in front of the supervisor.

@@ -10,12 +10,7 @@ expect 0 "" "$takt" run "$graph" --clock virtual --for 20s --record "$work/run.m
 begin() {
   "$takt" replay "$work/run.mcap" --output "$work/replayed" "$@" >"$work/replay.out" 2>"$work/replay.err" &
   replay=$!
-  while kill -0 $replay 2>/dev/null; do
-    "$takt" top --once --run $replay >"$work/top" 2>/dev/null && return
-    sleep 0.1
-  done
-  cat "$work/replay.err"
-  fail "the replay ended before it could be looked at"
+  attachable $replay replay
 }
 
 echo "=== its messages, jobs and time"

@@ -25,8 +25,7 @@ struct IidcSettings {
   bool falling = false;    ///< at the falling edge
 };
 
-/// Format 7, mode 3: all sensors at one instant, a byte of each in every pixel (devices.md of the camera's maker calls
-/// the format a container). V4L2's words become libdc1394's calls:
+/// Format 7, mode 3: all sensors at one instant, a byte of each in every pixel. V4L2's words become libdc1394's calls:
 ///
 ///   VIDIOC_S_FMT    mode, coding (Y16: RAW16 or MONO16, RGB3: RGB8), size
 ///   VIDIOC_S_PARM   bytes of a packet: a packet each 125 us, so many of them a frame
@@ -51,6 +50,7 @@ class IidcVideoDevice final : public v4l2::VideoDevice {
   std::span<const uint8_t> map(size_t bytes, uint32_t index) override;
   void unmap(std::span<const uint8_t>) override {}
   short wait(int64_t timeout_ns) override;
+  bool allocates() const override { return true; }  ///< where it is opened again
 
  private:
   static constexpr uint32_t kMostBuffers = 8, kRing = 4;

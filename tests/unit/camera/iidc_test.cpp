@@ -324,6 +324,7 @@ TEST_CASE("iidc: a damaged frame is told, a camera that goes is lost, and found 
   rig.camera.there = true;
   rig.camera.refuses.clear();
   CHECK(rig.driver->restart(rig.clock.now_ns()));
+  CHECK((rig.driver->declared_calls().calls & bit(JobCall::malloc)) != 0);  // a job did that
   rig.clock.advance_to(rig.clock.now_ns() + 100'000'000);
   rig.arrives(2);
   CHECK(rig.read() == ReadStatus::ok);
