@@ -135,8 +135,8 @@ Json device_json(const TaskPlan& task, const SourceRecord& source) {
 }
 
 const char* word(uint32_t state) {
-  constexpr std::array<const char*, ProcessRecord::kStates> kWords{"starting", "composed", "joined",
-                                                                   "agreed",   "running",  "finished"};
+  constexpr std::array<const char*, ProcessRecord::kStates> kWords{"starting", "composed", "joined",  "agreed",
+                                                                   "running",  "saving",   "finished"};
   return state < kWords.size() ? kWords[state] : "unknown";
 }
 

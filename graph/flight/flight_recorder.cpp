@@ -40,7 +40,7 @@ std::string sentence_of(const Frozen& frozen) {
 }  // namespace
 
 FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,
-                               Transport& transport, const record::Head& head, Options options)
+                               Transport& transport, record::Head head, Options options)
     : options_(std::move(options)), board_(board), triggers_(graph, plan), places_(places(graph.record, plan)) {
   const graph::RecordSpec& spec = graph.record;
   const std::string name = name_of_run(graph.name);
@@ -73,6 +73,7 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
   const auto note = [this](const std::optional<Cause>& cause) {
     if (cause) freezer_->freeze(*cause);
   };
+  head.facts["states_ns"] = std::to_string(places_.states_ns);
   record::Recorder::Options how;
   how.by_caller = options_.by_caller;
   how.priority = options_.priority;

@@ -36,7 +36,7 @@ class FlightRecorder {
   /// Before the first job, once the ports have their memory. All given outlives this, the data of the head too. What
   /// is in the way is in lacks(), and nothing is kept then.
   FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
-                 const record::Head& head, Options options);
+                 record::Head head, Options options);
   ~FlightRecorder();
   FlightRecorder(const FlightRecorder&) = delete;
   FlightRecorder& operator=(const FlightRecorder&) = delete;

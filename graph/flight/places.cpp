@@ -19,11 +19,22 @@ constexpr int64_t kSlowest_ns = 1'000'000'000;
 /// As long may it take until a window has been copied out of memory.
 constexpr int64_t kWritten_ns = 2'000'000'000;
 
+/// A large state is kept on disk as seldom as makes this of it, and each file of a minute has one.
+constexpr double kStatesOnDisk = 0.25e6;
+constexpr int64_t kMostSeldom_ns = 60'000'000'000;
+
 /// Messages of a port that are kept with all fields, a second.
 double kept_hz(const PortRule& rule, double rate_hz) {
   if (rule.keep != PortRule::all) return 0;
   const double hz = rate_hz / rule.every;
   return rule.pause_ns > 0 ? std::min(hz, 1e9 / static_cast<double>(rule.pause_ns)) : hz;
+}
+
+/// What a node remembers, where it is too much to be kept each time.
+PortRule rule_of_state(double bytes) {
+  const auto pause_ns = std::min(kMostSeldom_ns, static_cast<int64_t>(1e9 * bytes / kStatesOnDisk));
+  return 1e9 * bytes / static_cast<double>(pause_ns) > kMostOnDisk ? PortRule{PortRule::hash}
+                                                                   : PortRule{PortRule::all, 1, pause_ns};
 }
 
 }  // namespace
@@ -62,7 +73,13 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
       places.memory_bytes_s += bytes_s;
       places.memory[p] = rule;
     }
-    rule.keep = PortRule::hash;
+    if (asked != nullptr || !state) {
+      rule.keep = PortRule::hash;
+      continue;
+    }
+    rule = rule_of_state(static_cast<double>(port.chunk_bytes()));
+    places.disk_bytes_s += kept_hz(rule, rate_hz) * static_cast<double>(port.chunk_bytes());
+    places.states_ns = std::max(places.states_ns, rule.pause_ns);
   }
   return places;
 }

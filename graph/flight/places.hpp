@@ -11,10 +11,12 @@
 namespace takt::flight {
 
 /// What the ring keeps of each port, and where: small messages with all fields on disk; of images and clouds their
-/// hashes on disk, and of those of devices, and where the graph asks for it, all fields in memory.
+/// hashes on disk, and of those of devices, and where the graph asks for it, all fields in memory. Large states of
+/// nodes are in both, on disk one now and then.
 struct Places {
   std::vector<record::PortRule> disk, memory;   ///< by port
   double disk_bytes_s = 0, memory_bytes_s = 0;  ///< at most, from the ports' capacities and rates
+  int64_t states_ns = 0;                        ///< the longest pause between two states of a node on disk
   bool in_memory() const;                       ///< at least one port is
 };
 

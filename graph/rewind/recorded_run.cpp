@@ -47,8 +47,9 @@ int64_t frozen_from_ns(const record::LogFile& file) {
   return INT64_MIN;
 }
 
-/// A replay from an instant on looks for snapshots in so many intervals before it.
-constexpr int64_t kIntervals = 5;
+/// A replay from an instant on looks for snapshots in so many intervals before it, and in the last and the next to last
+/// of those in which a ring on disk has one of each large state.
+constexpr int64_t kIntervals = 5, kStates = 2;
 /// A job that was released before the end of a part is published until then.
 constexpr int64_t kLatest_ns = 5'000'000'000;
 
@@ -84,10 +85,14 @@ command::RunOptions& RecordedRun::open() {
 /// A record without an end does not say when its run began, and is read whole.
 void RecordedRun::read_part() {
   if (fact(file_->end(), "epoch_ns").empty()) return file_->read(INT64_MIN, INT64_MAX);
-  const int64_t snapshots_ns = std::strtoll(fact(file_->facts(), "snapshots_ns").c_str(), nullptr, 10);
+  const auto told_ns = [this](const char* name) {
+    return static_cast<int64_t>(std::strtoll(fact(file_->facts(), name).c_str(), nullptr, 10));
+  };
+  const int64_t snapshots_ns = told_ns("snapshots_ns");
   const bool begins_late = options_.from_s > 0 && snapshots_ns > 0;
-  file_->read(begins_late ? at(options_.from_s) - kIntervals * snapshots_ns : INT64_MIN,
-              options_.until_s ? at(*options_.until_s) + kLatest_ns : INT64_MAX);
+  file_->read(
+      begins_late ? at(options_.from_s) - kIntervals * snapshots_ns - kStates * told_ns("states_ns") : INT64_MIN,
+      options_.until_s ? at(*options_.until_s) + kLatest_ns : INT64_MAX);
 }
 
 int RecordedRun::compose(const Registry& registry) {

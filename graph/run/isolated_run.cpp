@@ -47,6 +47,7 @@ constexpr int64_t kStartDelayNs = 100'000'000;  // devices start between the agr
 // Without memory the kernel ends processes of low nodes first, then the others, the supervisor last.
 constexpr int kGoesFirst = 500, kGoesLate = 200;
 constexpr int64_t kPatienceNs = kSlowdown * 3'000'000'000LL;  // for the processes to end after the stop
+constexpr int64_t kSavingNs = kSlowdown * 60'000'000'000LL;   // ... while nodes save maps, maybe to a slow disk
 
 /// Ends the run with an exit code before it began.
 struct Refused {
@@ -326,7 +327,12 @@ class IsolatedRun {
         supervisor_->let_end();
         give_up_ns = now + kPatienceNs;
       }
-      if (!board_.dismissed().load() && (all_finished() || now > give_up_ns)) {
+      const bool saves = all_have(ProcessRecord::saving) && !all_have(ProcessRecord::finished);
+      if (saves && now > give_up_ns && give_up_ns < end + kSavingNs) {
+        std::fprintf(stderr, "takt: nodes write their files; it may take 60 s\n");
+        give_up_ns = end + kSavingNs;
+      }
+      if (!board_.dismissed().load() && (all_have(ProcessRecord::finished) || now > give_up_ns)) {
         record_.take_rest();
         board_.dismissed().store(true);
         give_up_ns = now + kPatienceNs;
@@ -352,10 +358,10 @@ class IsolatedRun {
     wait_until([&] { return (chunks_at_end_ = transport_->chunks_in_use()) == 0 || clock_.now_ns() >= until; });
   }
 
-  /// Those that live.
-  bool all_finished() const {
+  /// Those that live have come so far.
+  bool all_have(ProcessRecord::State reached) const {
     for (size_t p = 0; p < group_.size(); ++p)
-      if (group_.pid(p) != 0 && board_.process(p).state.load() != ProcessRecord::finished) return false;
+      if (group_.pid(p) != 0 && board_.process(p).state.load() < reached) return false;
     return true;
   }
 

@@ -189,6 +189,7 @@ int run_member(const MemberPart& part) {
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
   record.simulator_cpu_ns += prepared.devices.simulator_use().cpu_ns;
   record.simulator_in_jobs_ns += prepared.devices.simulator_use().in_jobs_ns;
+  record.reach(ProcessRecord::saving, prepared.clock->now_ns());
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
   record.reach(ProcessRecord::finished, prepared.clock->now_ns());

@@ -68,8 +68,8 @@ struct LifeSigns {
 
 /// How far one process of a run has come, and what it used. A restarted one goes on with the record of the one before.
 struct alignas(kCacheLine) ProcessRecord {
-  enum State : uint32_t { starting, composed, joined, agreed, running, finished };
-  static constexpr size_t kStates = 6;
+  enum State : uint32_t { starting, composed, joined, agreed, running, saving, finished };
+  static constexpr size_t kStates = 7;
   std::atomic<uint32_t> state{starting};
   std::array<std::atomic<int64_t>, kStates> reached_ns{};  ///< by state: when it was reached last
   std::atomic<uint32_t> problems{0};                       ///< why it could not be composed: how many, told on stderr

@@ -191,6 +191,9 @@ sizes = lambda report: {pool["port"]: pool["bytes"] for pool in report["memory"]
 assert sizes(several) == sizes(whole), (sizes(several), sizes(whole))
 PY
 
+# A node may take longer to save its files than a process may to end.
+BLINK="finish slowly" expect 0 "" "$takt" run "$graph" --for 1s --isolate subsystem --policy cooperative --output "$work/out"
+
 # In its jobs it is contained as every node is.
 for trouble in throw crash loop; do
   "$takt" run "$graph" --for 3s --isolate subsystem --policy cooperative --set blinker.trouble=$trouble --output "$work/out" \

@@ -83,6 +83,9 @@ class Blinker final : public takt::Node {
     put(*message, job.index() % 2 == 0 ? "on" : "off");
     light_.send(job.release_ns());
   }
+  void finish() override {
+    if (asked_for("finish slowly")) sleep(8);  // its files go to a slow disk
+  }
 
  private:
   void cause_trouble() {

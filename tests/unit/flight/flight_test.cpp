@@ -9,6 +9,7 @@
 #include "graph/flight/flight_recorder.hpp"
 #include "graph/flight/left_runs.hpp"
 #include "rt/record/log_file.hpp"
+#include "rt/sched/plan_ports.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/record/recorded_run.hpp"
 
@@ -91,6 +92,30 @@ TEST_CASE("Small ports are kept on disk, large ones in memory and by their hash 
   CHECK(!places.in_memory());
   spec.ports.front() = {{"filter", "grid"}, {nothing, 1, 0}, {}};
   CHECK(flight::places(spec, small.plan).disk[1].keep == nothing);
+}
+
+TEST_CASE("A large state is on disk now and then, one in a minute at least, and in memory each time") {
+  using enum record::PortRule::Keep;
+  test::SmallGraph small;
+  small.plan.tasks[1].state_every_ns = kSecond;
+  const size_t port = small.plan.tasks[1].ports.front();
+  const auto kept = [&](uint32_t bytes) {
+    small.plan.ports[port].capacity = {bytes, 1, 1, 0};
+    return flight::places({}, small.plan);
+  };
+  REQUIRE(is_state_port(small.plan.tasks[1], port));
+  CHECK(kept(400'000).disk[port].pause_ns == 0);
+  const double bytes = static_cast<double>((kept(1'500'000), small.plan.ports[port].chunk_bytes()));
+  Places places = kept(1'500'000);
+  CHECK(places.disk[port].keep == all);
+  CHECK(places.disk[port].pause_ns == static_cast<int64_t>(bytes / 0.25e6 * 1e9));
+  CHECK(places.memory[port].keep == all);
+  CHECK(places.memory[port].pause_ns == 0);
+  CHECK(places.states_ns == places.disk[port].pause_ns);
+  CHECK(kept(20'000'000).states_ns == 60 * kSecond);
+  places = kept(80'000'000);  // one in a minute is more than a port may have on disk
+  CHECK(places.disk[port].keep == hash);
+  CHECK(places.states_ns == 0);
 }
 
 TEST_CASE("Misses of high nodes, old chains, modes and marks are causes") {

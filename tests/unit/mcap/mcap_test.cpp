@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The container: what is written is read back, whole, cut off anywhere, or damaged.
 #include <doctest/doctest.h>
+#include <sys/resource.h>
 
+#include <array>
+#include <csignal>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <random>
 
+#include "rt/record/mcap/file_sink.hpp"
 #include "rt/record/mcap/reader.hpp"
 #include "rt/record/mcap/records.hpp"
 #include "rt/record/mcap/tail.hpp"
@@ -366,4 +370,27 @@ TEST_CASE("A summary without the index of its chunks takes bounded memory, and t
   REQUIRE(reader);
   CHECK(reader->missing() == "");
   CHECK(messages_of(*reader).size() == 50);
+}
+
+TEST_CASE("A file that takes a part of what it is given keeps none of it, and takes more later") {
+  const test::TemporaryFolder folder;
+  const auto bytes = [](size_t size, char fill) { return std::vector<std::byte>(size, std::byte(fill)); };
+  const auto one = bytes(1000, 'a'), two = bytes(3000, 'b'), none = bytes(0, 'c');
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit usual{};
+  getrlimit(RLIMIT_FSIZE, &usual);
+  const rlimit little{3500, usual.rlim_max};
+  auto sink = FileSink::open(folder.path / "file");
+  REQUIRE(sink);
+  const std::array<Bytes, 4> parts{one, none, two, one};
+  CHECK(sink->append(std::span(parts).first(2)));
+  setrlimit(RLIMIT_FSIZE, &little);
+  const auto refused = sink->append(parts);
+  setrlimit(RLIMIT_FSIZE, &usual);
+  CHECK(!refused);
+  CHECK(std::filesystem::file_size(folder.path / "file") == 1000);
+  CHECK(sink->append(parts));
+  std::ifstream in(folder.path / "file");
+  const std::string all{std::istreambuf_iterator<char>(in), {}};
+  CHECK(all == std::string(2000, 'a') + std::string(3000, 'b') + std::string(1000, 'a'));
 }

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 
 #include "recorded_run.hpp"
 #include "rt/record/join.hpp"
@@ -82,11 +83,12 @@ struct RememberingGraph {
   }
 };
 
-/// `only_hash`: of what the nodes make.
+/// `only_hash`: of what the nodes make. `pauses_s`: between two states that the record has with all fields.
 struct RememberedRun {
   test::TemporaryFolder folder;
   std::filesystem::path file = folder.path / "run.mcap";
-  explicit RememberedRun(bool only_hash = false, bool second_declares = true, int64_t seconds = 20) {
+  explicit RememberedRun(bool only_hash = false, bool second_declares = true, int64_t seconds = 20,
+                         std::array<int64_t, 2> pauses_s = {0, 0}) {
     auto sink = mcap::FileSink::open(file);
     REQUIRE(sink);
     RememberingGraph graph(second_declares);
@@ -94,6 +96,8 @@ struct RememberedRun {
     how.snapshot_every_ns = kOneSecond;
     how.file.chunk_bytes = 2000;
     if (only_hash) how.ports = test::with_fields({1, 0, 0, 1, 1});
+    for (size_t state = 0; only_hash && second_declares && state < 2; ++state)
+      how.ports[3 + state].pause_ns = pauses_s[state] * kOneSecond;
     CHECK(test::record_run(graph.plan, *sink, seconds, std::move(how)).lost() == 0);
   }
   LogFile open() const {
@@ -130,6 +134,25 @@ TEST_CASE("A replay that begins anywhere makes what the run made, and no more jo
       CHECK(result.jobs >= left - 1);
       CHECK(result.jobs <= left + (only_hash ? 50 : 15));
     }
+  }
+}
+
+TEST_CASE("Where a record has states now and then, a replay begins at the last one of each node") {
+  const RememberedRun record(true, true, 20, {2, 5});
+  for (int64_t from_ms = 0; from_ms < 19'000; from_ms += 371) {
+    RememberingGraph graph;
+    LogFile log = record.open();
+    Replayer::Options how;
+    how.begin_ns = kEpoch + from_ms * 1'000'000;
+    const ReplayResult result = replay_part(log, graph, how);
+    CAPTURE(from_ms);
+    CHECK(result.different == 0);
+    CHECK(result.lacking == 0);
+    CHECK(result.compared > 0);
+    CHECK(result.begun_afresh == 0);
+    const auto left = static_cast<uint64_t>((20'000 - from_ms) / 100 + (20'000 - from_ms) / 1000);
+    CHECK(result.jobs >= left - 1);
+    CHECK(result.jobs <= left + 10 * (2 + 5 + 2));  // the second one goes back 5 s, and then the first by 2 more
   }
 }
 
