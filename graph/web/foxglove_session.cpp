@@ -44,7 +44,9 @@ struct Service {
 };
 constexpr Service kServices[] = {{"takt/mode", "mode", "mode", "changes the mode"},
                                  {"takt/mark", "mark", "words", "sets a mark with words"},
-                                 {"takt/stop", "stop", "", "ends the run"}};
+                                 {"takt/stop", "stop", "", "ends the run"},
+                                 {"takt/task", "task", "words", "hands the robot a task: goal cup_1.level=full"},
+                                 {"takt/know", "know", "object", "what the robot knows of an object"}};
 
 Json service_json(size_t id) {
   const Service& service = kServices[id];

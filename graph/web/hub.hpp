@@ -20,16 +20,11 @@
 #include <tuple>
 #include <vector>
 
-#include "hal/settings/json.hpp"
+#include "hal/settings/json_text.hpp"
 
 namespace takt::web {
 
 using Json = nlohmann::ordered_json;
-/// A member that is a text. Empty: there is none, or it is something else.
-inline std::string text_of(const Json& of, const char* key) {
-  const auto found = of.find(key);
-  return found != of.end() && found->is_string() ? found->get<std::string>() : "";
-}
 
 /// Where a server has the frozen records of its run.
 inline constexpr std::string_view kFrozenPath = "/frozen/";

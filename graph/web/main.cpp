@@ -17,6 +17,7 @@
 #include "graph/cli/other_program.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/language/graph.hpp"
+#include "graph/robot/robot_questions.hpp"
 #include "graph/web/frozen_files.hpp"
 #include "graph/web/link.hpp"
 #include "graph/web/server.hpp"
@@ -94,8 +95,11 @@ int serve(Options options) {
   });
   std::unique_ptr<Link> link;
   FrozenFiles files([&hub] { return frozen_folder(hub.graph()); }, command::takt_program());
+  const robot::RobotQuestions people([&hub] { return hub.graph(); },
+                                     [&link](const Json& question) { return link->ask(question); });
   const auto answer = [&](const Json& question) {
-    return FrozenFiles::is_asked(question) ? files.answer(question) : link->ask(question);
+    if (FrozenFiles::is_asked(question)) return files.answer(question);
+    return robot::RobotQuestions::is_asked(question) ? people.answer(question) : link->ask(question);
   };
   try {
     server = std::make_unique<Server>(

@@ -15,10 +15,10 @@ constexpr size_t kMostLooks = 64;
 constexpr double kScreenHz = 60;
 constexpr std::array<std::string_view, 7> kKinds{"picture", "disparity", "cloud", "scan", "grid", "pose", "value"};
 /// Questions that change the run; these and kFetches need the token.
-constexpr std::array<std::string_view, 6> kChanges{"set", "forget", "mode", "mark", "stop", "answer"};
+constexpr std::array<std::string_view, 7> kChanges{"set", "forget", "mode", "mark", "stop", "answer", "task"};
 /// Questions for what lies on the disk of the robot: its records, and a server that shows one.
 constexpr std::array<std::string_view, 3> kFetches{"download", "replay", "replayed"};
-constexpr std::array<std::string_view, 4> kLooks{"get", "top", "fault", "frozen"};
+constexpr std::array<std::string_view, 5> kLooks{"get", "top", "fault", "frozen", "know"};
 
 template <size_t N>
 bool among(const std::array<std::string_view, N>& words, std::string_view word) {

@@ -5,32 +5,19 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 
 #include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
+#include "graph/robot/known_objects.hpp"
 #include "nodes/robot_client/task.hpp"
-#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt::command {
 namespace {
 
+using robot::KnownObject;
 using Json = nlohmann::ordered_json;
-
-struct KnownObject {
-  std::string name, type;
-  double x_m = 0, y_m = 0;
-  std::vector<std::pair<std::string, std::string>> states;
-};
-
-std::vector<std::string> clients_of(const Json& top) {
-  std::vector<std::string> clients;
-  for (const Json& node : top.at("nodes"))
-    if (node.at("type") == "robot_client") clients.push_back(node.at("name").get<std::string>());
-  return clients;
-}
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -45,7 +32,7 @@ std::optional<attach::Connection> find_robot(const std::vector<int>& runs, const
     auto connection = attach::connect_to(run);
     const auto top = connection && connection->write({{"do", "top"}}) ? connection->read_line() : std::nullopt;
     if (!top) continue;  // it is about to begin, or to end
-    const auto clients = clients_of(*top);
+    const auto clients = robot::robot_clients(*top);
     if (wanted.empty() ? clients.empty() : !contains(clients, wanted)) continue;
     choices.push_back(fmt::format("{} ({}: {})", run, top->at("graph").get<std::string>(), fmt::join(clients, ", ")));
     found.emplace(std::move(*connection));
@@ -65,7 +52,7 @@ std::optional<attach::Connection> find_robot(const std::vector<int>& runs, const
 std::string client_of(attach::Connection& connection, const std::string& wanted) {
   Json top;
   if (ask(connection, {{"do", "top"}}, top) != kOk) return "";
-  const auto clients = clients_of(top);
+  const auto clients = robot::robot_clients(top);
   if (contains(clients, wanted)) return wanted;
   if (wanted.empty() && clients.size() == 1) return clients.front();
   refuse(clients.empty() ? "the run has no node of type robot_client"
@@ -74,46 +61,12 @@ std::string client_of(attach::Connection& connection, const std::string& wanted)
   return "";
 }
 
-/// Two texts of one element, each ended by 0, as echo gives them: one number a character.
-std::pair<std::string, std::string> two_texts(const Json& element) {
-  std::pair<std::string, std::string> texts;
-  for (size_t i = 0; i < element.size(); ++i) {
-    const auto c = static_cast<char>(element[i].get<int>());
-    std::string& text = i < sizeof(ObjectName::name) ? texts.first : texts.second;
-    if (c != '\0') text += c;
-  }
-  return texts;
-}
-
-std::vector<KnownObject> objects_of(const Json& message) {
-  std::vector<KnownObject> objects;
-  size_t state = 0;
-  const Json &names = message.at("names").at("first"), &places = message.at("places").at("first"),
-             &attributes = message.at("attributes").at("first");
-  for (size_t i = 0; i < names.size(); ++i) {
-    KnownObject object;
-    std::tie(object.name, object.type) = two_texts(names[i]);
-    object.x_m = places.at(i).at(0).get<double>();
-    object.y_m = places.at(i).at(1).get<double>();
-    for (auto left = places.at(i).at(5).get<double>(); left > 0; --left)
-      object.states.push_back(two_texts(attributes.at(state++)));
-    objects.push_back(std::move(object));
-  }
-  return objects;
-}
-
-std::string states_text(const KnownObject& object) {
-  std::string text;
-  for (const auto& [name, value] : object.states) text += fmt::format("{}{}={}", text.empty() ? "" : " ", name, value);
-  return text;
-}
-
 /// Objects where they are (Graphviz's neato keeps the places), with their types and states.
 std::string dot_of(const std::vector<KnownObject>& objects) {
   std::string text = "graph map {\n  node [shape=ellipse]\n";
   for (const KnownObject& o : objects)
     text += fmt::format("  \"{0}\" [pos=\"{2:.2f},{3:.2f}!\", label=\"{0}\\n{1}\\n{4}\"]\n", o.name, o.type, o.x_m,
-                        o.y_m, states_text(o));
+                        o.y_m, robot::states_text(o));
   return text + "}\n";
 }
 
@@ -132,67 +85,50 @@ int with_client(const RobotOptions& o, Work work) {
 
 /// The newest message of an output of the client.
 int echo(attach::Connection& connection, const std::string& port, Json& message, int64_t count = 1) {
-  const Json question{{"do", "echo"}, {"port", port}, {"count", count}, {"items", size_t{100'000}}};
-  const int code = ask(connection, question, message);
+  const int code =
+      ask(connection, {{"do", "echo"}, {"port", port}, {"count", count}, {"items", robot::kAllItems}}, message);
   if (code == kOk) message = Json(message.at("message"));
   return code;
 }
 
-/// A number before the text makes the same words another task.
+int known_objects(attach::Connection& connection, const std::string& client, std::vector<KnownObject>& objects) {
+  Json answer;
+  const int code = ask(connection, robot::map_question(client), answer);
+  if (code == kOk) objects = robot::known_objects(answer.at("message"));
+  return code;
+}
+
 int hand_in(const RobotOptions& o, const std::string& verb) {
   const std::string text = fmt::format("{}{}", verb, fmt::join(o.words, " "));
   if (const auto task = robot_client::parse_task(text); !task) return refuse(task.error(), kBadInput);
   return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
-    const auto number = std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
     Json answer;
-    return ask(connection, {{"do", "set"}, {"param", client + ".task"}, {"value", fmt::format("{} {}", number, text)}},
-               answer);
+    return ask(connection, robot::task_question(client, text), answer);
   });
 }
 
 int print_map(const RobotOptions& o) {
   return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
-    Json message;
-    if (const int code = echo(connection, client + ".map", message); code != kOk) return code;
-    const auto objects = objects_of(message);
+    std::vector<KnownObject> objects;
+    if (const int code = known_objects(connection, client, objects); code != kOk) return code;
     if (!o.dot.empty())
       if (const int code = write_output(o.dot, dot_of(objects), "--dot"); code != kOk) return code;
     std::printf("%-20s %-12s %8s %8s  %s\n", "object", "type", "x m", "y m", "states");
     for (const KnownObject& object : objects)
       std::printf("%-20s %-12s %8.2f %8.2f  %s\n", object.name.c_str(), object.type.c_str(), object.x_m, object.y_m,
-                  states_text(object).c_str());
+                  robot::states_text(object).c_str());
     return kOk;
   });
 }
 
 int answer_about(const RobotOptions& o) {
   return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
-    Json message;
-    if (const int code = echo(connection, client + ".map", message); code != kOk) return code;
-    const auto objects = objects_of(message);
-    const std::string wanted = o.object.substr(0, o.object.find('.'));
-    const auto object =
-        std::find_if(objects.begin(), objects.end(), [&](const KnownObject& k) { return k.name == wanted; });
-    if (object == objects.end()) {
-      std::vector<std::string> names;
-      for (const KnownObject& k : objects) names.push_back(k.name);
-      return refuse(fmt::format("the robot knows no object {}; it knows: {}", wanted, fmt::join(names, ", ")),
-                    kBadInput);
-    }
-    if (wanted == o.object) {
-      std::printf("%s is a %s at %.2f m, %.2f m; %s\n", object->name.c_str(), object->type.c_str(), object->x_m,
-                  object->y_m, object->states.empty() ? "no state is known" : states_text(*object).c_str());
-      return kOk;
-    }
-    const std::string attribute = o.object.substr(wanted.size() + 1);
-    for (const auto& [name, value] : object->states) {
-      if (name != attribute) continue;
-      std::printf("%s\n", value.c_str());
-      return kOk;
-    }
-    return refuse(
-        fmt::format("of {} the robot knows {}", wanted, object->states.empty() ? "no state" : states_text(*object)),
-        kBadInput);
+    std::vector<KnownObject> objects;
+    if (const int code = known_objects(connection, client, objects); code != kOk) return code;
+    const auto answer = robot::answer_about(objects, o.object);
+    if (!answer) return refuse(answer.error(), kBadInput);
+    std::printf("%s\n", answer->c_str());
+    return kOk;
   });
 }
 

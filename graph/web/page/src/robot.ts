@@ -8,6 +8,7 @@ import { CloudScreen } from "./screen_cloud.ts";
 import { PictureScreen } from "./screen_picture.ts";
 import { GridScreen, PoseScreen, ScanScreen } from "./screen_plan.ts";
 import { ValueScreen } from "./screen_value.ts";
+import { Tasks } from "./tasks.ts";
 
 const kMostPanels = 12;
 const kWays: Way[] = ["picture", "disparity", "grid", "scan", "cloud", "pose", "value"];
@@ -21,15 +22,18 @@ export class Robot implements View {
   private readonly grid = h("div", { class: "panels" });
   private readonly more = h("select", { "aria-label": "Port to add" });
   private readonly note = h("span", { class: "quiet", role: "status" });
+  private readonly tasks: Tasks;
   private panels: Panel[] = [];
   private visible = false;
   private built_for = "";
 
   constructor(private readonly app: App) {
     const add = h("button", { class: "small", click: () => this.add_chosen() }, "Add");
+    this.tasks = new Tasks(app);
     this.root = h(
       "div",
       { class: "view" },
+      this.tasks.root,
       h("div", { class: "tools add-panel" }, this.note, h("label", {}, "Panel ", this.more), add),
       this.grid,
     );
@@ -50,6 +54,7 @@ export class Robot implements View {
   /** Nobody looks: nothing is sent. */
   private run(): void {
     const on = this.visible && !document.hidden;
+    on ? this.tasks.start() : this.tasks.stop();
     for (const panel of this.panels) on ? panel.start() : panel.stop();
   }
 
@@ -60,6 +65,7 @@ export class Robot implements View {
     const key = JSON.stringify(graph.ports);
     if (key === this.built_for) return;
     this.built_for = key;
+    this.tasks.build();
     for (const panel of this.panels) panel.stop();
     this.panels = [];
     this.grid.replaceChildren();

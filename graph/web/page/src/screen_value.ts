@@ -4,6 +4,7 @@ import { h, table, table_box } from "./dom.ts";
 import { fixed, plain } from "./format.ts";
 import type { Seen } from "./link.ts";
 import { boxes_of, list_of, text_of, things_of } from "./messages.ts";
+import { network, states_of, title_of } from "./network.ts";
 import type { Screen } from "./panel.ts";
 import type { ValueMessage } from "./protocol.ts";
 
@@ -63,18 +64,17 @@ function show_things(message: Record<string, unknown>): HTMLElement {
   const { things, of, in_map } = things_of(message);
   const body = h("tbody");
   for (const thing of things) {
-    const attributes = thing.attributes.map((attribute) => `${attribute.name}=${attribute.value}`).join(" ");
     body.append(
       h(
         "tr",
         {},
-        h("th", { scope: "row" }, thing.name || "unnamed"),
+        h("th", { scope: "row" }, title_of(thing)),
         h("td", {}, thing.type),
         h("td", { class: "num" }, fixed(thing.x, 2)),
         h("td", { class: "num" }, fixed(thing.y, 2)),
         h("td", { class: "num" }, fixed(thing.z, 2)),
         h("td", { class: "num" }, `${fixed(100 * thing.score, 0)} %`),
-        h("td", {}, attributes),
+        h("td", {}, states_of(thing).join(" ")),
       ),
     );
   }
@@ -82,6 +82,7 @@ function show_things(message: Record<string, unknown>): HTMLElement {
   return h(
     "div",
     {},
+    network(things),
     table_box("Objects", table(["Object", "Type", ">x m", ">y m", ">z m", ">Sure", "State"], body)),
     h("p", { class: "quiet" }, note),
   );

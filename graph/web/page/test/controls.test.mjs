@@ -53,7 +53,7 @@ check("mode: an error stays in the dialog", {}, async (page) => {
     "the error",
   );
   await page.keyboard.press("Escape");
-  assert.equal(await page.locator("dialog").count(), 0);
+  await until(async () => (await page.locator("dialog").count()) === 0, "the dialog's end");
 });
 
 check("stop asks first", {}, async (page) => {
@@ -216,6 +216,55 @@ check("touch: answers go to the device of the dialogue, in two languages", { vie
   await until(async () => (await page.locator(".reply").textContent()).startsWith("Verstanden"), "the reply");
   await page.getByRole("button", { name: "Zurück" }).click();
   assert.equal(await page.locator("#panel-overview").isVisible(), true);
+});
+
+check(
+  "robot: a task is handed over in words, and what it knows is corrected by a click",
+  { view: "robot" },
+  async (page) => {
+    const tasks = page.locator(".tasks");
+    await tasks.getByRole("button", { name: "level=full" }).waitFor();
+    await tasks.getByLabel("Of what").fill("cup_1.level=full");
+    await tasks.getByRole("button", { name: "Hand over" }).click();
+    await until(
+      async () => (await tasks.locator("[role=status]").textContent()) === "Handed over: goal cup_1.level=full",
+      "the reply",
+    );
+    await tasks.getByRole("button", { name: "level=full" }).click();
+    assert.equal(await tasks.getByLabel("What it is to do").inputValue(), "tell");
+    assert.equal(await tasks.getByLabel("Of what").inputValue(), "cup_1.level=");
+    server.model.answer = () => ({ error: "`cup_1.level=` has no value" });
+    await page.keyboard.press("Enter");
+    await until(
+      async () => (await tasks.locator(".error").textContent()) === "`cup_1.level=` has no value",
+      "the error",
+    );
+    await tasks.getByRole("button", { name: "table_1" }).click();
+    assert.equal(await tasks.getByLabel("Of what").inputValue(), "table_1.");
+    await tasks.getByLabel("What it is to do").selectOption("explore");
+    assert.equal(await tasks.getByLabel("Of what").isVisible(), false);
+    await tasks.getByRole("button", { name: "Hand over" }).click();
+    await until(() => asked("task").length === 3, "three tasks");
+    assert.deepEqual(
+      asked("task").map(({ client, words }) => [client, words]),
+      [
+        ["robot_client", "goal cup_1.level=full"],
+        ["robot_client", "tell cup_1.level="],
+        ["robot_client", "explore"],
+      ],
+    );
+  },
+);
+
+test("a graph without a robot client has no tasks", async () => {
+  server = await new FakeServer().start();
+  server.graph.nodes.find((node) => node.type === "robot_client").type = "mission";
+  const { page, troubles, close } = await open(browser, server, { view: "robot" });
+  await page.locator(".panel").first().waitFor();
+  assert.equal(await page.locator(".tasks").isVisible(), false);
+  assert.deepEqual(troubles, []);
+  await close();
+  await server.stop();
 });
 
 for (const token of ["", "wrong"]) {

@@ -14,7 +14,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 export const kPolicy =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'";
 const kTypes = { "index.html": "text/html", "page.js": "text/javascript", "page.css": "text/css" };
-const kChanges = ["set", "forget", "mode", "mark", "stop", "answer", "download", "replay", "replayed"];
+const kChanges = ["set", "forget", "mode", "mark", "stop", "answer", "task", "download", "replay", "replayed"];
 
 export class FakeServer {
   /** `pictures`: from pictures.mjs. `running_s`: how long the run has lasted at the first hello. */

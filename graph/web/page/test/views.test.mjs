@@ -72,7 +72,7 @@ for (const [width, height] of kSizes) {
         assert.equal(await page.locator(`#panel-${view}`).isVisible(), true, "the digit opens the view");
         await until(() => page.evaluate(kReady[view]), `all of ${view}`);
         if (view === "overview") await page.locator("g.node", { hasText: "ego_motion" }).press("Enter");
-        if (view === "parameters") await page.locator("summary").first().click();
+        if (view === "parameters") await page.locator("#panel-parameters summary").first().click();
         if (view === "timeline") await page.locator(".late-jobs button").first().click();
         await page.screenshot({ path: join(shots, `${view}-${width}x${height}-${scheme}.png`) });
         assert.deepEqual(await serious_findings(page), []);
