@@ -17,6 +17,8 @@ void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOp
   app.add_option("--profile", load.profile, "sim | replay | robot, as the graph defines them");
   reads_file(app.add_option("--schedule", load.schedule, "schedule file instead of the graph's"));
   app.add_option("--policy", load.policy, "deadline | fixed | cooperative instead of the schedule's");
+  app.add_option("--machine", load.machine,
+                 "the part of the graph that this machine of its `machines` runs (default: all)");
   app.add_option("--mode", load.mode, "a mode of the graph (default full)");
   reads_file(
       app.add_option("--params", load.params, "parameter file of this robot: constants, parameters, device settings"));

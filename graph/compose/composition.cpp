@@ -93,7 +93,7 @@ class Composer {
   }
 
   Composition outline() {
-    for (const DeviceSpec& device : graph_.devices) add_device(device, registry_.devices.find(device.kind)->shell());
+    for (const DeviceSpec& device : graph_.devices) add_device(device, shell_of(device));
     make_nodes();
     connect();
     return std::move(result_);
@@ -103,7 +103,7 @@ class Composer {
   tl::expected<void, ComposeError> make_devices(const DeviceFactory& make_device) {
     for (const DeviceSpec& device : graph_.devices) {
       if (!owns(device.id)) {
-        add_device(device, registry_.devices.find(device.kind)->shell());
+        add_device(device, shell_of(device));
         continue;
       }
       auto node = make_device(device);
@@ -114,6 +114,11 @@ class Composer {
       add_device(device, std::move(*node));
     }
     return {};
+  }
+
+  std::unique_ptr<Node> shell_of(const DeviceSpec& device) const {
+    if (device.remote) return std::make_unique<RemoteNode>(remote_ports(registry_, *device.remote), nullptr);
+    return registry_.devices.find(device.kind)->shell();
   }
 
   void add_device(const DeviceSpec& device, std::unique_ptr<Node> node) {
@@ -231,8 +236,10 @@ class Composer {
     }
   }
 
-  /// Whoever expects something of an output reads it, too: nodes leave out what nobody reads.
+  /// Whoever expects something of an output reads it, too, and other machines do: nodes leave out what nobody reads.
   void mark_expected() {
+    for (const PortName& port : graph_.exported)
+      PortAccess::mark_read(output_of(result_.plan.ports[port_index_.at(port.text())]));
     if (!graph_.expect) return;
     const auto mark = [&](const ConditionSpec& condition) {
       if (const auto port = port_index_.find(condition.port.text()); port != port_index_.end())
@@ -339,6 +346,23 @@ class Composer {
 };
 
 }  // namespace
+
+std::vector<RemoteNode::Port> remote_ports(const Registry& registry, const RemoteSpec& remote) {
+  if (remote.type.empty()) return {};
+  const std::unique_ptr<Node> there =
+      remote.of_device ? registry.devices.find(remote.type)->shell() : registry.nodes.find(remote.type)->make();
+  std::vector<RemoteNode::Port> ports;
+  for (const std::string& name : remote.ports) {
+    const OutputPort& output = *there->outputs()[index_of(there->outputs(), name)];
+    ports.push_back({name, std::string(output.doc()), &output.type()});
+  }
+  return ports;
+}
+
+StampLaw remote_law(const RemoteSpec& remote) {
+  if (remote.lag_ns) return {*remote.lag_ns, 0, 0, {}};
+  return StampLaw::none("it comes from machine " + remote.machine + ", whose `ages` do not name it");
+}
 
 Composition outline(const GraphSpec& graph, const Registry& registry, const Clock& clock) {
   return Composer(graph, registry, clock, {}).outline();

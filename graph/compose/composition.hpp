@@ -7,6 +7,7 @@
 
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
+#include "hal/remote/remote_node.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/sched/plan_ports.hpp"
@@ -21,6 +22,10 @@ struct ComposeError {
 
 /// Makes the hardware node of a device entry.
 using DeviceFactory = std::function<tl::expected<std::unique_ptr<Node>, ComposeError>(const DeviceSpec&)>;
+
+/// What a device that stands for a node or device of another machine has.
+std::vector<RemoteNode::Port> remote_ports(const Registry& registry, const RemoteSpec& remote);
+StampLaw remote_law(const RemoteSpec& remote);
 
 /// Where the processes of a run tell each other what only the owner of a node knows, so that all have one plan: how
 /// large its outputs can become, and when a hardware node's data come about.

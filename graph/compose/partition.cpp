@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "graph/language/part_of_machine.hpp"
+
 namespace takt::graph {
 namespace {
 
@@ -13,7 +15,7 @@ constexpr const char* kDevices = "devices";
 /// Home of every id before anything is merged: a subsystem's name, or "devices".
 std::map<std::string, std::string> homes_of(const GraphSpec& graph) {
   std::map<std::string, std::string> homes;
-  for (const DeviceSpec& device : graph.devices) homes[device.id] = kDevices;
+  for (const DeviceSpec& device : graph.devices) homes[device.id] = device.remote ? kLinkProcess : kDevices;
   for (const NodeSpec& node : graph.nodes) homes[node.id] = node.subsystem;
   return homes;
 }

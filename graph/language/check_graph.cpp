@@ -125,6 +125,7 @@ void Loader::check_lost(const ModeSpec& mode) {
   const std::string pointer = child(child("/modes", mode.name), "lost");
   std::vector<std::string> devices;
   for (const auto& device : spec_.devices) devices.push_back(device.id);
+  for (const auto& machine : spec_.machines) devices.push_back(machine.name);
   std::set<std::string> lost;
   for (const auto& id : mode.lost) {
     if (std::find(devices.begin(), devices.end(), id) == devices.end())

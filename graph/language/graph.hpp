@@ -76,6 +76,16 @@ struct NodeSpec {
   Position position;
 };
 
+/// What a node or device of another machine gives, as a device of this one (part_of_machine.hpp).
+struct RemoteSpec {
+  std::string machine;
+  std::string type;  ///< of the node there, or kind of the device; empty: it stands for the machine
+  bool of_device = false;
+  std::vector<std::string> ports;  ///< outputs that nodes here read
+  /// A stamp lies at most so long before the release of the job that hands it on. Nothing: the graph does not say.
+  std::optional<int64_t> lag_ns = {};
+};
+
 /// A device with the driver and settings of the chosen profile. Settings are converted to SI units.
 struct DeviceSpec {
   std::string id, kind, driver;
@@ -83,6 +93,7 @@ struct DeviceSpec {
   nlohmann::json settings = nlohmann::json::object();
   std::vector<EdgeSpec> edges;  ///< commands to the device, such as a velocity
   Position position;
+  std::optional<RemoteSpec> remote = {};  ///< then kind and driver say nothing
 };
 
 using takt::Criticality;
@@ -247,6 +258,21 @@ struct WebSpec {
 /// Whether only programs of this machine reach a server at this address.
 bool is_loopback(std::string_view address);
 
+/// A machine of a graph that may run on several.
+struct MachineSpec {
+  std::string name, address;
+  std::vector<std::string> runs;        ///< subsystems and devices
+  std::map<std::string, int64_t> ages;  ///< of outputs that others read, when they are published, at most
+  Position position;
+};
+
+/// The part `network` of a graph: what lies between its machines.
+struct NetworkSpec {
+  int64_t latency_ns = 20'000'000;     ///< of a message, at most
+  int64_t clock_error_ns = 1'000'000;  ///< that two machines may be unsure of each other's clock
+  int domain = 0;                      ///< of DDS
+};
+
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
   std::filesystem::path directory;
@@ -261,6 +287,10 @@ struct GraphSpec {
   std::optional<ExpectSpec> expect;
   RecordSpec record;
   WebSpec web;
+  std::vector<MachineSpec> machines;
+  NetworkSpec network;
+  std::string machine;               ///< the one that this is the part of; empty: it is the whole graph
+  std::vector<PortName> exported;    ///< outputs of this machine that others read
   std::vector<ConditionSpec> asked;  ///< LoadOptions::conditions
   ScheduleSpec schedule;
   KeptValues kept;
@@ -287,6 +317,7 @@ struct LoadOptions {
   std::filesystem::path params;  ///< parameter file of this robot; empty: none
   std::filesystem::path state;   ///< folder whose overlay of the graph is read, see overlay.hpp; empty: none
   std::vector<std::filesystem::path> plugin_files = {};  ///< of --plugin
+  std::string machine = {};                              ///< its part of the graph; empty: all of it
   std::vector<std::string> conditions = {};              ///< as in `expect`, on ports: GraphSpec::asked
   std::vector<PluginFact> plugins = {};                  ///< all that were loaded for this graph, see graph/plugins
 };

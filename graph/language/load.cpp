@@ -33,17 +33,20 @@ Loaded Loader::load(const std::filesystem::path& file) {
     read_params();
     read_devices();
     read_schedule();
+    read_machines();
     make_parts();
     check_edges();
     check_chains();
     check_schedule();
     check_modes();
+    check_machines();
     read_expect();
     read_record();
     read_web();
     read_asked();
     apply_mode();
     tell_what_is_not_enforced();
+    if (problems_.empty()) choose_machine();
   }
   // By file (the graph first), then by place; what two stages found alike is said once.
   const auto key = [&](const Problem& p) {

@@ -153,6 +153,13 @@ class Loader {
   void read_record_size(const nlohmann::json& value, std::string_view key, int64_t least, int64_t& bytes);
   void read_record_port(const std::string& name);
 
+  // read_machines.cpp: which machine runs what
+  void read_machines();
+  void read_machine(const std::string& name, const nlohmann::json& value);
+  void read_network();
+  void check_machines();
+  void choose_machine();
+
   // read_web.cpp: where runs are shown
   void read_web();
 

@@ -10,7 +10,9 @@
 #include <stdexcept>
 #include <thread>
 
+#include "graph/language/part_of_machine.hpp"
 #include "graph/run/machine.hpp"
+#include "graph/run/machine_link.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/record.hpp"
 #include "graph/run/support.hpp"
@@ -143,6 +145,13 @@ int run_member(const MemberPart& part) {
   how.exchange = &exchange;
   if (part.spare) how.exchange = &told_already;
   how.quiet = part.spare;
+  std::unique_ptr<machines::Link> link;  // its nodes go first, as all that this process has of them
+  if (part.partition.names[part.process] == graph::kLinkProcess && !part.graph.machine.empty()) {
+    without_rights([&] { link = make_link(part.graph, registry, options.load.set, board, *prepared.clock); });
+    prepared.remote_source = [&link](const graph::DeviceSpec& device, const auto& ports) {
+      return link->source(device.remote->machine, device.id, ports, graph::remote_law(*device.remote));
+    };
+  }
   if (const int code = compose(options, how, prepared); code != kOk) {
     if (!part.spare) record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
     return code;
@@ -169,6 +178,8 @@ int run_member(const MemberPart& part) {
     record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   }
   const auto transport = part.faults.inject(std::move(joined), plan, *prepared.clock, board);
+  if (link) begin(*link, part.graph, plan, *transport);
+  const std::shared_ptr<void> before_transport(nullptr, [&link](void*) { link.reset(); });  // whose messages it reads
   BoardGate gate(board, part.process, *prepared.clock);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <stdexcept>
 
 #include "graph/run/record.hpp"
 #include "rt/capability.hpp"
@@ -21,6 +23,11 @@ int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) 
 
 graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   return [&prepared, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
+    if (spec.remote) {
+      auto ports = graph::remote_ports(prepared.registry, *spec.remote);
+      auto source = prepared.remote_source(spec, ports);
+      return std::make_unique<RemoteNode>(std::move(ports), std::move(source));
+    }
     const hal::DeviceConfig config{spec.id, spec.kind,       spec.driver, spec.settings, prepared.graph->directory,
                                    seed,    prepared.plugged};
     auto node = hal::make_device(prepared.registry.devices, config, prepared.devices, *prepared.clock);
@@ -31,6 +38,30 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
     return tl::make_unexpected(std::move(error));
   };
 }
+
+/// What a node of another machine can give, as the whole graph says where nothing is run.
+class ComposedElsewhere final : public RemoteSource {
+ public:
+  ComposedElsewhere(const graph::DeviceSpec& device, const Plan& whole)
+      : id_(device.id), law_(graph::remote_law(*device.remote)), whole_(whole) {}
+  DeviceResult open() override { return {}; }
+  void close() override {}
+  DeviceResult start(int64_t) override { return {}; }
+  void stop() override {}
+  StampLaw stamp_law(const JobTimes&) const override { return law_; }
+  Capacity capacity(std::string_view output) override {
+    return std::find_if(whole_.ports.begin(), whole_.ports.end(),
+                        [&](const PortPlan& port) { return port.node == id_ && port.port == output; })
+        ->capacity;
+  }
+  Inbox& inbox(size_t) override { throw std::logic_error("nothing is run"); }
+  ReadStatus status(int64_t) override { return ReadStatus::no_data; }
+
+ private:
+  const std::string id_;
+  const StampLaw law_;
+  const Plan& whole_;
+};
 
 }  // namespace
 
@@ -64,6 +95,17 @@ int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepare
 int prepare_check(const RunOptions& options, Prepared& prepared) {
   prepared.plugged = false;
   int code = load(options, prepared);
+  std::optional<Prepared> whole;
+  if (code == kOk && !prepared.graph->machine.empty()) {
+    whole.emplace(prepared.registry);
+    RunOptions of_all = options;
+    of_all.load.machine.clear();
+    code = prepare_check(of_all, *whole);
+    prepared.remote_source = [&whole](const graph::DeviceSpec& device, const auto&) {
+      return std::make_unique<ComposedElsewhere>(device, whole->composition->plan);
+    };
+    if (code != kOk) return code;
+  }
   if (code == kOk) {
     // As a run would, so that what is checked is what runs.
     RunOptions as_run = options;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "graph/cli/graph_file.hpp"
 #include "graph/compose/composition.hpp"
@@ -21,6 +23,9 @@ struct Prepared {
   std::optional<graph::Composition> composition;
   std::vector<graph::Problem> problems;  ///< why there is no composition
   bool plugged = true;                   ///< hardware is there and is opened
+  /// Where what other machines give comes in; needed for the part of one machine.
+  std::function<std::unique_ptr<RemoteSource>(const graph::DeviceSpec&, const std::vector<RemoteNode::Port>&)>
+      remote_source = {};
 };
 
 /// Loads the graph; what is wrong is written to stderr and the exit code returned (kOk: all is well). The caller tells

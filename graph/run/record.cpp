@@ -76,7 +76,7 @@ bool keeps_ring(const RunOptions& options, const graph::GraphSpec& graph) {
 Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
   const uint32_t followers = (options.record.empty() ? 0u : 1u) +
                              (options.keep_ring ? flight::FlightRecorder::kFollowers : 0u) + (graph.expect ? 1u : 0u) +
-                             (options.witness ? 1u : 0u);
+                             (options.witness ? 1u : 0u) + (graph.exported.empty() ? 0u : 1u);
   return {1, followers, kUndisturbedNs};
 }
 
@@ -124,6 +124,7 @@ record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan,
                 {"params", graph.params_file.empty() ? "" : absolute(graph.params_file)},
                 {"profile", graph.profile},
                 {"mode", options_.load.mode},
+                {"machine", graph.machine},
                 {"policy_asked", std::string(to_string(graph.schedule.policy))},
                 {"policy_option", options_.load.policy},
                 {"set", settings(options_, graph)},

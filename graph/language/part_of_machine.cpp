@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/language/part_of_machine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "graph/language/words.hpp"
+
+namespace takt::graph {
+namespace {
+
+constexpr int64_t kRemoteBudget_ns = 1'000'000;  ///< to copy what has come
+constexpr Rate kMachineRate{10, 1};
+
+class Splitter {
+ public:
+  Splitter(GraphSpec& graph, const std::string& machine) : graph_(graph), whole_(graph), machine_(machine) {
+    for (const MachineSpec& one : graph_.machines)
+      for (const std::string& id : one.runs) home_[id] = one.name;
+    for (const NodeSpec& node : graph_.nodes) home_[node.id] = home_[node.subsystem];
+  }
+
+  void take() {
+    find_borders();
+    std::erase_if(graph_.nodes, [&](const NodeSpec& node) { return !here(node.id); });
+    std::erase_if(graph_.devices, [&](const DeviceSpec& device) { return !here(device.id); });
+    std::erase_if(graph_.subsystems, [&](const SubsystemSpec& subsystem) { return !here(subsystem.name); });
+    std::erase_if(graph_.schedule.entries, [&](const auto& entry) { return !here(entry.first); });
+    for (const auto& [id, ports] : needed_) add_remote(id, ports);
+    for (const MachineSpec& other : graph_.machines)
+      if (other.name != machine_) add_machine(other);
+    for (const DeviceSpec& device : graph_.devices) ids_.insert(device.id);
+    for (const NodeSpec& node : graph_.nodes) ids_.insert(node.id);
+    take_modes();
+    take_chains();
+    take_expectations();
+    std::erase_if(graph_.record.ports, [&](const RecordSpec::Port& rule) { return !has(rule.port); });
+    std::erase_if(graph_.record.freeze, [&](const ConditionSpec& condition) { return !has(condition.port); });
+    std::erase_if(graph_.asked, [&](const ConditionSpec& condition) { return !has(condition.port); });
+    graph_.machine = machine_;
+    graph_.isolation = "subsystem";
+  }
+
+ private:
+  bool here(const std::string& id) const {
+    const auto found = home_.find(id);
+    return found != home_.end() && found->second == machine_;
+  }
+  /// Whether that output is there, in this part.
+  bool has(const PortName& port) const {
+    if (here(port.node)) return ids_.contains(port.node);
+    const auto ports = needed_.find(port.node);
+    return ports != needed_.end() && ports->second.contains(port.port);
+  }
+
+  template <class Each>
+  void for_each_edge(const Each& each) const {
+    for (const DeviceSpec& device : whole_.devices)
+      for (const EdgeSpec& edge : device.edges) each(device.id, edge);
+    for (const NodeSpec& node : whole_.nodes)
+      for (const EdgeSpec& edge : node.edges) each(node.id, edge);
+  }
+
+  void find_borders() {
+    for_each_edge([&](const std::string& to, const EdgeSpec& edge) {
+      if (here(to) && !here(edge.from.node)) needed_[edge.from.node].insert(edge.from.port);
+      if (!here(to) && here(edge.from.node) &&
+          std::find(graph_.exported.begin(), graph_.exported.end(), edge.from) == graph_.exported.end())
+        graph_.exported.push_back(edge.from);
+    });
+  }
+
+  /// Of what is released by messages, that of the first in the row.
+  Rate rate_of(const std::string& id) const {
+    const auto entry = whole_.schedule.entries.find(id);
+    if (entry != whole_.schedule.entries.end() && entry->second.rate) return *entry->second.rate;
+    if (entry != whole_.schedule.entries.end() && entry->second.on) return rate_of(entry->second.on->node);
+    const auto device =
+        std::find_if(whole_.devices.begin(), whole_.devices.end(), [&](const auto& d) { return d.id == id; });
+    return device != whole_.devices.end() && device->rate ? *device->rate : Rate{10, 1};
+  }
+
+  void add_remote(const std::string& id, const std::set<std::string>& ports) {
+    DeviceSpec device;
+    device.id = id;
+    device.remote = RemoteSpec{home_.at(id), "", false, {ports.begin(), ports.end()}};
+    for (const NodeSpec& node : whole_.nodes)
+      if (node.id == id) device.remote->type = node.type, device.position = node.position;
+    for (const DeviceSpec& other : whole_.devices)
+      if (other.id == id)
+        device.remote->type = other.kind, device.remote->of_device = true, device.position = other.position;
+    const Rate rate = rate_of(id);
+    device.remote->lag_ns = lag_of(id, ports, rate);
+    add(std::move(device), Rate{2 * rate.numerator, rate.denominator});
+  }
+
+  /// What the graph says of its age, then the way here; and the newest one stays so until the next one is here.
+  std::optional<int64_t> lag_of(const std::string& id, const std::set<std::string>& ports, const Rate& rate) const {
+    const auto machine = std::find_if(whole_.machines.begin(), whole_.machines.end(),
+                                      [&](const MachineSpec& other) { return other.name == home_.at(id); });
+    int64_t oldest_ns = 0;
+    for (const std::string& port : ports) {
+      const auto age = machine->ages.find(id + "." + port);
+      if (age == machine->ages.end()) return std::nullopt;
+      oldest_ns = std::max(oldest_ns, age->second);
+    }
+    return oldest_ns + whole_.network.latency_ns + 2 * whole_.network.clock_error_ns + rate.period_ns();
+  }
+
+  void add_machine(const MachineSpec& other) {
+    DeviceSpec device;
+    device.id = other.name;
+    device.position = other.position;
+    device.remote = RemoteSpec{other.name, "", false, {}, 0};
+    add(std::move(device), kMachineRate);
+  }
+
+  void add(DeviceSpec device, Rate rate) {
+    ScheduleEntry entry;
+    entry.rate = rate;
+    entry.budget_ns = kRemoteBudget_ns;
+    entry.position = device.position;
+    graph_.schedule.entries[device.id] = entry;
+    graph_.devices.push_back(std::move(device));
+  }
+
+  void take_modes() {
+    for (ModeSpec& mode : graph_.modes)
+      for (auto* list : {&mode.without, &mode.lost})
+        std::erase_if(*list, [&](const std::string& id) { return !ids_.contains(id); });
+  }
+
+  /// Ids that data of an output reach over edges of the whole graph.
+  std::set<std::string> reached_from(const PortName& from) const {
+    std::set<std::string> reached;
+    for (size_t before = SIZE_MAX; before != reached.size();) {
+      before = reached.size();
+      for_each_edge([&](const std::string& to, const EdgeSpec& edge) {
+        if (edge.from == from || reached.contains(edge.from.node)) reached.insert(to);
+      });
+    }
+    return reached;
+  }
+
+  /// A chain that begins elsewhere begins here where it comes in; its bound holds as it did, since stamps are kept.
+  void take_chains() {
+    std::erase_if(graph_.chains, [&](ChainSpec& chain) {
+      if (!here(chain.to.node)) return true;
+      if (has(chain.from)) return false;
+      const std::set<std::string> there = reached_from(chain.from);
+      for (const auto& [id, ports] : needed_)
+        for (const std::string& port : ports)
+          if (there.contains(id) && reached_from({id, port}).contains(chain.to.node)) {
+            graph_.adjusted.push_back(fmt::format("chain {}: from {}: {} is on machine {}", chain.name, id + "." + port,
+                                                  chain.from.text(), home_.at(chain.from.node)));
+            chain.from = {id, port};
+            return false;
+          }
+      return true;
+    });
+  }
+
+  void take_expectations() {
+    if (!graph_.expect) return;
+    const auto foreign = [&](const auto& item) { return !ids_.contains(item.first); };
+    auto& expect = *graph_.expect;
+    std::erase_if(expect.conditions, [&](const ConditionSpec& c) {
+      return (c.of == ConditionSpec::Of::messages || c.of == ConditionSpec::Of::field) && !has(c.port);
+    });
+    for (auto* figures :
+         {&expect.figures.rates, &expect.figures.results, &expect.figures.misses, &expect.figures.stale})
+      std::erase_if(*figures, foreign);
+    std::erase_if(expect.figures.ages, [&](const auto& item) {
+      return std::none_of(graph_.chains.begin(), graph_.chains.end(),
+                          [&](const auto& chain) { return chain.name == item.first; });
+    });
+  }
+
+  GraphSpec& graph_;
+  const GraphSpec whole_;
+  const std::string machine_;
+  std::map<std::string, std::string> home_;              ///< machine of subsystems, devices and nodes
+  std::map<std::string, std::set<std::string>> needed_;  ///< outputs of others, by who makes them
+  std::set<std::string> ids_;                            ///< of nodes and devices of this part
+};
+
+}  // namespace
+
+GraphSpec part_of_machine(GraphSpec graph, const std::string& machine) {
+  Splitter(graph, machine).take();
+  return graph;
+}
+
+void run_on_one_machine(GraphSpec& graph) {
+  for (ModeSpec& mode : graph.modes)
+    std::erase_if(mode.lost, [&](const std::string& id) {
+      return std::any_of(graph.machines.begin(), graph.machines.end(),
+                         [&](const auto& machine) { return machine.name == id; });
+    });
+}
+
+}  // namespace takt::graph

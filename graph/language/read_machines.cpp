@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which machine runs what (`machines`), and what lies between them (`network`).
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "graph/language/loader.hpp"
+#include "graph/language/part_of_machine.hpp"
+
+namespace takt::graph {
+
+using nlohmann::json;
+
+void Loader::read_machines() {
+  read_network();
+  const json machines = graph_.root.value("machines", json());
+  if (!machines.is_object()) return;
+  for (const auto& [name, value] : machines.items())
+    if (value.is_object()) read_machine(name, value);
+  std::sort(spec_.machines.begin(), spec_.machines.end(),
+            [&](const auto& a, const auto& b) { return before(a.position, b.position); });
+}
+
+void Loader::read_machine(const std::string& name, const json& value) {
+  MachineSpec machine;
+  machine.name = name;
+  machine.position = graph_.key_at(child("/machines", name));
+  claim_id(name, machine.position);
+  if (const json address = value.value("address", json()); address.is_string()) machine.address = address;
+  const json runs = value.value("runs", json::array());
+  for (const json& one : runs.is_array() ? runs : json::array())
+    if (one.is_string()) machine.runs.push_back(one);
+  const json given = value.value("ages", json());
+  const json ages = given.is_object() ? given : json::object();
+  for (const auto& [port, ignored] : ages.items())
+    if (const auto ns =
+            read_time(graph_, ages, child(child("/machines", name), "ages"), port, "machine " + ticked(name)))
+      machine.ages[port] = *ns;
+  spec_.machines.push_back(std::move(machine));
+}
+
+void Loader::read_network() {
+  const json network = graph_.root.value("network", json());
+  if (!network.is_object()) return;
+  const auto time = [&](const char* key, int64_t& into) {
+    const auto ns = read_time(graph_, network, "/network", key, "`network`");
+    if (ns && *ns > 0) into = *ns;
+    else if (ns)
+      problem(graph_.value_at(child("/network", key)), fmt::format("{} of `network` must be above 0", ticked(key)));
+  };
+  time("latency", spec_.network.latency_ns);
+  time("clock_error", spec_.network.clock_error_ns);
+  if (const json domain = network.value("domain", json()); domain.is_number_integer())
+    spec_.network.domain = domain.get<int>();
+}
+
+/// Each subsystem and device runs on one machine, and what releases a node on the same one.
+void Loader::check_machines() {
+  if (spec_.machines.empty()) return;
+  std::map<std::string, std::string> home;  // of subsystems and devices
+  std::vector<std::string> all;
+  for (const SubsystemSpec& subsystem : spec_.subsystems) all.push_back(subsystem.name);
+  for (const DeviceSpec& device : spec_.devices) all.push_back(device.id);
+  for (const MachineSpec& machine : spec_.machines) {
+    const std::string pointer = child(child("/machines", machine.name), "runs");
+    for (const std::string& id : machine.runs) {
+      if (std::find(all.begin(), all.end(), id) == all.end())
+        problem(item_at(pointer, id), fmt::format("machine {} runs {}, which is no subsystem or device{}",
+                                                  ticked(machine.name), ticked(id), alternatives(id, all)));
+      else if (const auto [known, fresh] = home.emplace(id, machine.name); !fresh)
+        problem(item_at(pointer, id), fmt::format("machine {} runs {}, which machine {} runs", ticked(machine.name),
+                                                  ticked(id), ticked(known->second)));
+    }
+  }
+  for (const std::string& id : all)
+    if (!home.contains(id))
+      problem(graph_.key_at("/machines"), fmt::format("no machine runs {}; add it to `runs` of one", ticked(id)));
+  for (const SubsystemSpec& subsystem : spec_.subsystems)
+    if (subsystem.name == kLinkProcess)
+      problem(subsystem.position,
+              fmt::format("{} is no name of a subsystem in a graph with `machines`: it is the process "
+                          "that talks to the others",
+                          ticked(subsystem.name)));
+  const auto home_of = [&](const std::string& id) {
+    const auto part = parts_.find(id);
+    const bool device = part == parts_.end() || part->second.device;
+    const auto found = home.find(device ? id : part->second.subsystem);
+    return found == home.end() ? std::string() : found->second;
+  };
+  for (const auto& [id, entry] : spec_.schedule.entries)
+    if (entry.on && home_of(id) != home_of(entry.on->node))
+      problem(entry.position, fmt::format("{} is released by {}, which another machine runs; give it a rate",
+                                          ticked(id), ticked(entry.on->text())));
+}
+
+void Loader::choose_machine() {
+  if (options_.machine.empty()) return run_on_one_machine(spec_);
+  std::vector<std::string> names;
+  for (const MachineSpec& machine : spec_.machines) names.push_back(machine.name);
+  if (std::find(names.begin(), names.end(), options_.machine) == names.end())
+    return problem({"--machine", 0, 0}, names.empty() ? fmt::format("graph {} has no `machines`", ticked(spec_.name))
+                                                      : fmt::format("graph {} has no machine {}{}", ticked(spec_.name),
+                                                                    ticked(options_.machine),
+                                                                    alternatives(options_.machine, names, "machines")));
+  spec_ = part_of_machine(std::move(spec_), options_.machine);
+}
+
+}  // namespace takt::graph

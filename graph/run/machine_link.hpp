@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graph/language/graph.hpp"
+#include "graph/language/registry.hpp"
+#include "graph/machines/link.hpp"
+#include "rt/sched/run_board.hpp"
+#include "rt/shm/transport.hpp"
+
+namespace takt::command {
+
+/// The link of the part of a graph that one machine runs, in its process kLinkProcess, before that composes. Throws
+/// std::runtime_error: there is no network to run over. Graph, board and clock outlive it.
+/// `set`: what the command line sets, the same on all machines.
+std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const Registry& registry,
+                                          const std::vector<std::string>& set, RunBoard& board, const Clock& clock);
+
+/// Once the messages of this machine can be read.
+void begin(machines::Link& link, const graph::GraphSpec& graph, const Plan& plan, Transport& transport);
+
+}  // namespace takt::command

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+# A graph on two machines: two network namespaces with a cable between them. As root; without the right to make them it says so.
+source "$(dirname "$0")/lib.sh" "$@"
+[ -e "$(dirname "$takt")/../../rt/libtakt_dds.so" ] || { echo "NOT RUN: built without cyclonedds-dev and cyclonedds-tools"; exit 77; }
+graph=$source/graph/two_machines.yaml
+one=takt-m1-$$ two=takt-m2-$$
+ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add m1 type veth peer name m2 netns $two ||
+  { echo "NOT RUN: no right to make network namespaces"; exit 77; }
+trap 'ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
+for end in "$one m1 10.93.0.1" "$two m2 10.93.0.2"; do
+  read -r space device address <<<"$end"
+  ip -n "$space" addr add "$address/24" dev "$device"
+  ip -n "$space" link set "$device" up
+  ip -n "$space" link set lo up
+done
+
+expect 0 "" "$takt" check "$graph"
+expect 0 "" "$takt" check "$graph" --machine robot
+expect 0 "" "$takt" check "$graph" --machine vision
+expect 2 'no machine `arm`; machines: robot, vision' "$takt" check "$graph" --machine arm
+expect 2 'has no `machines`' "$takt" check "$source/graph/lasers.yaml" --machine robot
+
+on() { # on SPACE NAME MACHINE SECONDS GRAPH OPTIONS...: a run in the background
+  ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off --output "$work/$2" \
+    --report "$work/$2.json" "${@:6}" >"$work/$2.out" 2>"$work/$2.err" &
+}
+on $one robot robot 16 "$graph"
+robot=$!
+on $two vision vision 4 "$graph" --record "$work/vision.mcap"
+vision=$!
+wait $vision || fail "vision: exit $?: $(tail -n 5 "$work/vision.err" "$work/vision.out")"
+python3 - "$work/vision.json" <<'PY' || fail "what came of the odometry is wrong"
+import json, sys
+report = json.load(open(sys.argv[1]))
+edge = next(e for e in report["edges"] if e["from"] == "base.odometry")
+assert 45 <= edge["received"] <= 62, edge                        # 15 Hz for 4 s, once both know each other
+device = next(d for d in report["devices"] if d["name"] == "base")
+assert device["damaged"] == device["missing"] == 0, device
+assert 10 < edge["age_ms"]["p50"] < 200, edge                    # stamps of the other clock, in this one's
+PY
+# What came over the network is in the record as of any device: it replays on one machine.
+tells 0 " 0 differ" "$takt" replay "$work/vision.mcap" --compare --output "$work/again"
+sleep 1  # it is missed
+on $two vision2 vision 4 "$graph"  # again, as a new run: the first machine has it back
+wait $! || fail "vision again: $(tail -n 5 "$work/vision2.err")"
+wait $robot
+python3 - "$work/robot.json" <<'PY' || fail "the loss of a machine is no mode"
+import json, sys
+report = json.load(open(sys.argv[1]))
+modes = [mode["name"] for mode in report["modes"]]
+assert modes.count("alone") >= 2 and "full" in modes, report["modes"]
+edge = next(e for e in report["edges"] if e["from"] == "traversability.traversability")
+assert edge["received"] >= 25 and edge["age_ms"]["p50"] < 500, edge  # 5 Hz, as long as the other one is there
+stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
+assert stop["completed"] >= stop["released"] - 1 >= 200, stop
+PY
+
+# Another graph is not listened to.
+sed 's/max_age: 200ms/max_age: 201ms/' "$graph" >"$source/graph/.other_$$.yaml"
+trap 'rm -f "$source/graph/.other_$$.yaml"; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
+on $one other robot 6 "$source/graph/.other_$$.yaml"
+other=$!
+on $two stranger vision 2 "$graph"
+stranger=$!
+for _ in $(seq 100); do grep -q "machine robot runs another graph" "$work/stranger.err" && break; sleep 0.1; done
+grep -q "machine robot runs another graph, schedule or other parameters: it is not listened to" "$work/stranger.err" ||
+  fail "a stranger is listened to: $(cat "$work/stranger.err")"
+kill -INT $stranger $other  # both wait for the other one
+wait $stranger $other
+
+# An address that is not there.
+expect 3 "no domain on 10.93.0.1; is that address one of this machine?" "$takt" run "$graph" --machine robot --for 1s --policy cooperative --output "$work/none"
+finish
