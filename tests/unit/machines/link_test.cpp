@@ -147,8 +147,8 @@ TEST_CASE(
   pair.start_vision(), pair.start_robot();
   pair.source->capacity("grid");
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  size_t data = 0;
-  pair.network.loses = [&](const std::string& topic) { return topic == "takt/ace/vision/map/grid" && ++data % 3 == 0; };
+  std::atomic<size_t> data = 0;
+  pair.network.lose([&](const std::string& topic) { return topic == "takt/ace/vision/map/grid" && ++data % 3 == 0; });
   for (int i = 0; i < 10; ++i) pair.publisher.publish(pair.there.now_ns(), pair.there.now_ns());
   CHECK(soon([&] { return pair.source->counts().received == 7; }));
   CHECK(pair.source->counts().missing == 3);
@@ -177,6 +177,7 @@ TEST_CASE("A machine that runs another graph is named and not listened to; a set
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   pair.robot->give_up();
   setup.join();
+  pair.robot.reset();
   REQUIRE(!pair.said.empty());
   CHECK(pair.said.front().find("machine vision runs another graph") != std::string::npos);
 }

@@ -24,6 +24,10 @@ struct Network {
   std::vector<End*> ends;
   std::function<bool(const std::string& topic)> loses = [](const std::string&) { return false; };
 
+  void lose(std::function<bool(const std::string& topic)> which) {
+    const std::lock_guard lock(mutex);
+    loses = std::move(which);
+  }
   void carry(const std::string& topic, std::span<const std::byte> bytes) {
     const std::lock_guard lock(mutex);
     if (loses(topic)) return;
