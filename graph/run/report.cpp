@@ -194,17 +194,24 @@ Json cpu_json(const RunFacts& facts) {
             {"runtime", share(runtime)}}}};
 }
 
-/// Age of what the node publishes on a port, at that instant; null if the mode leaves the node out.
-const Histogram* output_age(const RunFacts& facts, const graph::PortName& name) {
+/// Age of what the node publishes on an output, at that instant, or of what its jobs have of an input; null if the mode
+/// leaves the node out.
+const Histogram* age_at(const RunFacts& facts, const graph::PortName& name) {
   for (size_t p = 0; p < facts.plan.ports.size(); ++p)
     if (facts.plan.ports[p].node == name.node && facts.plan.ports[p].port == name.port) return &facts.board.port(p).age;
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t)
+    for (size_t e = 0; e < facts.plan.tasks[t].edges.size(); ++e) {
+      const TaskPlan& task = facts.plan.tasks[t];
+      if (task.name == name.node && task.node->inputs()[task.edges[e].input]->name() == name.port)
+        return &facts.board.edge(t, e).age;
+    }
   return nullptr;
 }
 
 Json chains_json(const RunFacts& facts, const ProofReport& proofs) {
   Json chains = Json::array();
   for (const graph::ChainSpec& chain : facts.graph.chains) {
-    const Histogram* age = output_age(facts, chain.to);
+    const Histogram* age = age_at(facts, chain.to);
     const bool sampled = age != nullptr && age->count() > 0;
     const Json proven = proofs.of_chain(chain.name);
     chains.push_back({{"name", chain.name},

@@ -55,11 +55,14 @@ Json chains_json(const RecordedRun& recorded, const Plan& plan, const graph::Gra
   Json chains = Json::array();
   for (const graph::ChainSpec& chain : graph.chains) {
     Histogram age;  // none: no node of that name
-    for (size_t t = 0; t < plan.tasks.size(); ++t)
-      for (size_t o = 0; o < plan.tasks[t].ports.size(); ++o)
-        if (const PortPlan& port = plan.ports[plan.tasks[t].ports[o]];
-            port.node == chain.to.node && port.port == chain.to.port)
-          age = recorded.figures[t].output_age[o];
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      const TaskPlan& task = plan.tasks[t];
+      if (task.name != chain.to.node) continue;
+      for (size_t o = 0; o < task.ports.size(); ++o)
+        if (plan.ports[task.ports[o]].port == chain.to.port) age = recorded.figures[t].output_age[o];
+      for (size_t e = 0; e < task.edges.size(); ++e)
+        if (task.node->inputs()[task.edges[e].input]->name() == chain.to.port) age = recorded.figures[t].edge_age[e];
+    }
     chains.push_back(chain_json(chain, age));
   }
   return chains;

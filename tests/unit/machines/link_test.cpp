@@ -143,11 +143,11 @@ TEST_CASE("A message comes once its time has come, with its stamp in the clock o
 
 TEST_CASE(
     "What the network loses is counted, a late message too, and a machine that is gone is noticed and comes back") {
+  std::atomic<size_t> data = 0;
   Pair pair;
   pair.start_vision(), pair.start_robot();
   pair.source->capacity("grid");
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  std::atomic<size_t> data = 0;
   pair.network.lose([&](const std::string& topic) { return topic == "takt/ace/vision/map/grid" && ++data % 3 == 0; });
   for (int i = 0; i < 10; ++i) pair.publisher.publish(pair.there.now_ns(), pair.there.now_ns());
   CHECK(soon([&] { return pair.source->counts().received == 7; }));

@@ -159,6 +159,17 @@ TEST_CASE("proofs: what was proven stands beside what was seen, and holds") {
   CHECK(command::summary_text(report).find("proofs held: 4 figures") != std::string::npos);
 }
 
+TEST_CASE("proofs: a chain may end at an input, and is seen there") {
+  Scene scene;
+  const std::string input(scene.reader.inputs()[0]->name());
+  scene.graph.chains[0].to = {"reader", input};
+  const Json report = scene.run(20);
+  const Json& chain = report["chains"][0];
+  CHECK(chain["within"] == true);
+  CHECK(chain["age_ms"]["max"] > 0);
+  CHECK(chain["age_ms"] == report["edges"][0]["age_ms"]);
+}
+
 TEST_CASE("proofs: a planted overhead, larger than charged, is unexplained, told first, and the run is not ok") {
   Scene scene;
   scene.latency_ns = 300 * kUs;
