@@ -10,6 +10,7 @@
 
 #include "graph/machines/frame.hpp"
 #include "rt/record/packed_message.hpp"
+#include "rt/sched/histogram.hpp"
 
 namespace takt::machines {
 namespace {
@@ -18,7 +19,7 @@ constexpr int64_t kStateEvery_ns = 100'000'000;
 constexpr int64_t kSilent_ns = 3 * kStateEvery_ns;  ///< then a machine is lost
 constexpr int64_t kTold_ns = 1'000'000'000;         ///< so long a trouble is told
 constexpr int64_t kPatience_ns = 20'000'000;
-constexpr auto kLook = std::chrono::microseconds(500);
+constexpr auto kLook = std::chrono::microseconds(200);
 constexpr auto kTellAgain = std::chrono::seconds(10);
 
 std::string topic_name(std::string_view graph, std::string_view machine, std::string_view what) {
@@ -44,6 +45,7 @@ struct Link::Import {
   std::atomic<Inbox*> inbox{nullptr};  ///< null: nobody takes messages yet
   uint64_t run = 0;
   Arrivals arrivals;
+  Histogram latency;  ///< from publication there to arrival here
   std::atomic<uint64_t> received{0}, missing{0}, damaged{0}, late{0}, no_room{0}, unknown_clock{0};
   std::atomic<int64_t> late_at_ns{INT64_MIN}, unknown_at_ns{INT64_MIN};  ///< the last one
 };
@@ -130,22 +132,23 @@ Link::~Link() {
   if (sending_.joinable()) sending_.join();
   if (taking_.joinable()) taking_.join();
   if (!options_.say) return;
-  for (const std::string& line : lacks()) options_.say(line);
+  for (const std::string& line : summary()) options_.say(line);
 }
 
-std::vector<std::string> Link::lacks() const {
+std::vector<std::string> Link::summary() const {
   std::vector<std::string> lines;
   for (const auto& import : imports_) {
     std::string what;
     const auto add = [&](uint64_t count, const char* word) {
-      if (count > 0) what += fmt::format("{}{} {}", what.empty() ? "" : ", ", count, word);
+      if (count > 0) what += fmt::format("{} {} {}", what.empty() ? ";" : ",", count, word);
     };
     add(import->missing.load(), "missing"), add(import->late.load(), "late"), add(import->damaged.load(), "damaged");
     add(import->arrivals.doubles(), "doubled"), add(import->arrivals.passes(), "behind a newer one");
     add(import->no_room.load(), "without room"), add(import->unknown_clock.load(), "of unknown age");
-    if (!what.empty())
-      lines.push_back(fmt::format("{} from machine {}: {} received; {}", import->port, import->from.name,
-                                  import->received.load(), what));
+    const auto ms = [&](double share) { return static_cast<double>(import->latency.quantile_ns(share)) / 1e6; };
+    lines.push_back(fmt::format("{} from machine {}: {} received within {:.2f} (p50), {:.2f} (p99), {:.2f} ms{}",
+                                import->port, import->from.name, import->received.load(), ms(0.5), ms(0.99),
+                                static_cast<double>(import->latency.max_ns()) / 1e6, what));
   }
   for (size_t i = 0; i < exports_.size(); ++i)
     if (older_[i] > 0)
@@ -267,6 +270,7 @@ void Link::take_message(Import& import, std::span<const std::byte> bytes) {
     import.unknown_at_ns.store(now_ns);
   }
   if (!there) return;
+  import.latency.add(now_ns - (frame->published_ns - there->offset_ns));
   const int64_t visible_ns = frame->published_ns - there->offset_ns + options_.latency_ns + options_.clock_error_ns;
   if (now_ns > visible_ns) {
     import.late.fetch_add(1);

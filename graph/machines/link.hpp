@@ -27,7 +27,8 @@ namespace takt::machines {
 ///   link.begin(outgoing);                                             // messages go out
 ///
 /// A message may be seen from `latency` behind its publication on, plus what the clocks may be off. One that comes
-/// later is late: it is counted, and may be seen from then on.
+/// later is late: it is counted, and may be seen from then on. How long they took, and what was not as it should be, is
+/// said at the end.
 class Link {
  public:
   struct Options {
@@ -73,8 +74,9 @@ class Link {
  private:
   struct Import;
   class Source;
-  /// A line for each output of which something was not as it should be, once the threads have ended.
-  std::vector<std::string> lacks() const;
+  /// A line for each output of others that came, and of this one's that were not as they should be, once the threads
+  /// have ended.
+  std::vector<std::string> summary() const;
   void send(size_t export_index, const Held& held, std::vector<std::byte>& frame);
   Peer& peer(std::string_view name);
   void send_on(const std::stop_token& end);

@@ -3,15 +3,19 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 
 #include "graph/compose/composition.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "rt/abi.hpp"
 #include "rt/record/message_record.hpp"
+#include "rt/sched/grant.hpp"
 
 namespace takt::command {
 namespace {
@@ -70,6 +74,11 @@ std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const R
     exports.push_back({port.text(), told(board, index_of(outline.plan, port.node, port.port)), age_of(graph, port)});
   return std::make_unique<machines::Link>(std::move(options), imports, std::move(exports),
                                           machines::make_dds_wire(wire), clock);
+}
+
+void lift_other_threads() {
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task"))
+    if (const int id = std::atoi(thread.path().filename().c_str()); id != gettid()) lift_thread(id, kLowestPriority);
 }
 
 void begin(machines::Link& link, const graph::GraphSpec& graph, const Plan& plan, Transport& transport) {

@@ -18,6 +18,10 @@ namespace takt::command {
 std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const Registry& registry,
                                           const std::vector<std::string>& set, RunBoard& board, const Clock& clock);
 
+/// Puts the threads of this process but the calling one at kLowestPriority, as far as the kernel allows: those of the
+/// link and of its DDS, before there are others. Ordinary load then keeps no message waiting; lanes do.
+void lift_other_threads();
+
 /// Once the messages of this machine can be read.
 void begin(machines::Link& link, const graph::GraphSpec& graph, const Plan& plan, Transport& transport);
 

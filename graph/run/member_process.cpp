@@ -148,6 +148,7 @@ int run_member(const MemberPart& part) {
   std::unique_ptr<machines::Link> link;  // its nodes go first, as all that this process has of them
   if (part.partition.names[part.process] == graph::kLinkProcess && !part.graph.machine.empty()) {
     without_rights([&] { link = make_link(part.graph, registry, options.load.set, board, *prepared.clock); });
+    if (part.graph.schedule.policy != Policy::cooperative) lift_other_threads();
     prepared.remote_source = [&link](const graph::DeviceSpec& device, const auto& ports) {
       return link->source(device.remote->machine, device.id, ports, graph::remote_law(*device.remote));
     };
