@@ -24,7 +24,7 @@ on() { # on SPACE NAME MACHINE SECONDS GRAPH OPTIONS...: a run in the background
   ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off --output "$work/$2" \
     --report "$work/$2.json" "${@:6}" >"$work/$2.out" 2>"$work/$2.err" &
 }
-on $one robot robot 16 "$graph"
+on $one robot robot 18 "$graph"
 robot=$!
 on $two vision vision 4 "$graph" --record "$work/vision.mcap"
 vision=$!
@@ -41,8 +41,18 @@ PY
 # What came over the network is in the record as of any device: it replays on one machine.
 tells 0 " 0 differ" "$takt" replay "$work/vision.mcap" --compare --output "$work/again"
 sleep 1  # it is missed
-on $two vision2 vision 4 "$graph"  # again, as a new run: the first machine has it back
-wait $! || fail "vision again: $(tail -n 5 "$work/vision2.err")"
+on $two vision2 vision 6 "$graph"  # again, as a new run: the first machine has it back
+vision=$!
+sleep 3
+pkill -KILL -x link -P $vision
+wait $vision
+python3 - "$work/vision2.json" <<'PY' || fail "what came after the process link was lost is wrong"
+import json, sys
+report = json.load(open(sys.argv[1]))
+assert any("process link was ended by signal 9" in fault["what"] for fault in report["faults"]), report["faults"]
+device = next(d for d in report["devices"] if d["name"] == "base")
+assert device["state"] == "ok" and device["losses"] == 1, device
+PY
 wait $robot
 python3 - "$work/robot.json" <<'PY' || fail "the loss of a machine is no mode"
 import json, sys
