@@ -23,6 +23,14 @@ int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) 
 
 graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   return [&prepared, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
+    if (spec.remote && !prepared.remote_source) {
+      graph::ComposeError error;
+      error.problems.push_back(
+          {spec.position, fmt::format("{} comes from machine {}: a part of a graph runs in real time and in "
+                                      "several processes only",
+                                      spec.id, spec.remote->machine)});
+      return tl::make_unexpected(std::move(error));
+    }
     if (spec.remote) {
       auto ports = graph::remote_ports(prepared.registry, *spec.remote);
       auto source = prepared.remote_source(spec, ports);

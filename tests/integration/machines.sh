@@ -20,6 +20,11 @@ expect 0 "" "$takt" check "$graph" --machine vision
 expect 2 'no machine `arm`; machines: robot, vision' "$takt" check "$graph" --machine arm
 expect 2 'has no `machines`' "$takt" check "$source/graph/lasers.yaml" --machine robot
 
+for way in "run --clock virtual --output $work/none" "run --isolate none --output $work/none" profile; do
+  # shellcheck disable=SC2086
+  expect 2 "comes from machine vision: a part of a graph runs in real time" "$takt" $way "$graph" --machine robot --for 1s
+done
+
 on() { # on SPACE NAME MACHINE SECONDS GRAPH OPTIONS...: a run in the background
   ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off --output "$work/$2" \
     --report "$work/$2.json" "${@:6}" >"$work/$2.out" 2>"$work/$2.err" &
