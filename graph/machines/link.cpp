@@ -54,10 +54,6 @@ class Link::Source final : public RemoteSource {
  public:
   Source(Link& link, Peer& machine, std::vector<Import*> imports, StampLaw law)
       : link_(link), machine_(machine), imports_(std::move(imports)), law_(std::move(law)) {}
-  DeviceResult open() override { return {}; }
-  void close() override {}
-  DeviceResult start(int64_t) override { return {}; }
-  void stop() override {}
   StampLaw stamp_law(const JobTimes&) const override { return law_; }
   Capacity capacity(std::string_view output) override {
     for (Import* import : imports_) {

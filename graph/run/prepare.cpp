@@ -52,10 +52,6 @@ class ComposedElsewhere final : public RemoteSource {
  public:
   ComposedElsewhere(const graph::DeviceSpec& device, const Plan& whole)
       : id_(device.id), law_(graph::remote_law(*device.remote)), whole_(whole) {}
-  DeviceResult open() override { return {}; }
-  void close() override {}
-  DeviceResult start(int64_t) override { return {}; }
-  void stop() override {}
   StampLaw stamp_law(const JobTimes&) const override { return law_; }
   Capacity capacity(std::string_view output) override {
     return std::find_if(whole_.ports.begin(), whole_.ports.end(),

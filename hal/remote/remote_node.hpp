@@ -19,6 +19,12 @@ class RemoteSource : public Device {
   virtual Inbox& inbox(size_t output) = 0;
   /// Whether that machine is there, at the release of a job.
   virtual ReadStatus status(int64_t release_ns) = 0;
+
+  // What receives runs before and after the device.
+  DeviceResult open() override { return {}; }
+  void close() override {}
+  DeviceResult start(int64_t) override { return {}; }
+  void stop() override {}
 };
 
 /// What a node or device of another machine gives, as a device of this one. Each job hands on the next message of each

@@ -195,13 +195,16 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
   return result_;
 }
 
-/// Of the nodes that run: what a job lost in the record made, and cannot be made again.
+/// Of the nodes that run: what a job lost in the record made, and cannot be made again. States are never compared.
 void Replayer::count_unmade() {
   for (size_t t = 0; t < plan_.tasks.size(); ++t) {
     if (!runs(t) || !counts(t) || options_.end_ns != INT64_MAX) continue;
-    for (const size_t port : plan_.tasks[t].ports)
-      for (const auto& [sequence, known] : log_.messages(ports_[port].channel))
-        result_.unmade += !known.whole && sequence > ports_[port].before && !ports_[port].remade.contains(sequence);
+    for (size_t i = 0; i < plan_.tasks[t].ports.size(); ++i) {
+      const Port& port = ports_[plan_.tasks[t].ports[i]];
+      if (is_state(t, i)) continue;
+      for (const auto& [sequence, known] : log_.messages(port.channel))
+        result_.unmade += !known.whole && sequence > port.before && !port.remade.contains(sequence);
+    }
   }
 }
 
