@@ -14,11 +14,16 @@ for way in "run --clock virtual --output $work/none" "run --isolate none --outpu
   expect 2 "comes from machine vision: a part of a graph runs in real time" "$takt" $way "$graph" --machine robot --for 1s
 done
 
-[ -e "$(dirname "$takt")/../../rt/libtakt_dds.so" ] || { echo "NOT RUN: built without cyclonedds-dev and cyclonedds-tools"; exit 77; }
-command -v ip >/dev/null || { echo "NOT RUN: ip is missing (iproute2)"; exit 77; }
+not_run() {
+  echo "NOT RUN: $1"
+  [ $failures -eq 0 ] && exit 77
+  exit 1
+}
+[ -e "$(dirname "$takt")/../../rt/libtakt_dds.so" ] || not_run "built without cyclonedds-dev and cyclonedds-tools"
+command -v ip >/dev/null || not_run "ip is missing (iproute2)"
 one=takt-m1-$$ two=takt-m2-$$
 ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add m1 type veth peer name m2 netns $two ||
-  { echo "NOT RUN: no right to make network namespaces"; exit 77; }
+  not_run "no right to make network namespaces"
 trap 'ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
 for end in "$one m1 10.93.0.1" "$two m2 10.93.0.2"; do
   read -r space device address <<<"$end"
@@ -26,7 +31,6 @@ for end in "$one m1 10.93.0.1" "$two m2 10.93.0.2"; do
   ip -n "$space" link set "$device" up
   ip -n "$space" link set lo up
 done
-
 
 on() { # on SPACE NAME MACHINE SECONDS GRAPH OPTIONS...: a run in the background
   ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off --output "$work/$2" \
