@@ -2,6 +2,7 @@
 // Internal to graph/language: what the stages of load() share. Each stage appends to `problems` and goes on with what
 // is sound, so that one run shows everything.
 #pragma once
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -158,6 +159,7 @@ class Loader {
   void read_machine(const std::string& name, const nlohmann::json& value);
   void read_network();
   void check_machines();
+  void check_ages(const std::function<std::string(const std::string&)>& home_of);
   void choose_machine();
 
   // read_web.cpp: where runs are shown

@@ -87,10 +87,26 @@ void Loader::check_machines() {
     const auto found = home.find(device ? id : part->second.subsystem);
     return found == home.end() ? std::string() : found->second;
   };
+  check_ages(home_of);
   for (const auto& [id, entry] : spec_.schedule.entries)
     if (entry.on && home_of(id) != home_of(entry.on->node))
       problem(entry.position, fmt::format("{} is released by {}, which another machine runs; give it a rate",
                                           ticked(id), ticked(entry.on->text())));
+}
+
+/// What others count on are outputs of what the machine runs. `home_of`: the machine of a node or device.
+void Loader::check_ages(const std::function<std::string(const std::string&)>& home_of) {
+  for (const MachineSpec& machine : spec_.machines) {
+    std::vector<std::string> outputs;
+    for (const auto& [id, part] : parts_)
+      for (const PortInfo& output : home_of(id) == machine.name ? part.outputs : std::vector<PortInfo>())
+        outputs.push_back(id + "." + output.name);
+    for (const auto& [port, age_ns] : machine.ages)
+      if (std::find(outputs.begin(), outputs.end(), port) == outputs.end())
+        problem(graph_.key_at(child(child(child("/machines", machine.name), "ages"), port)),
+                fmt::format("`ages` of machine {} names {}, which is no output of what it runs{}", ticked(machine.name),
+                            ticked(port), alternatives(port, outputs, "its outputs")));
+  }
 }
 
 void Loader::choose_machine() {

@@ -111,6 +111,9 @@ TEST_CASE("Each subsystem and device runs on one machine, with what releases its
         {"`legs` runs `camera`", "machine `eyes` runs"});
   wrong("runs: [base, plan]", "runs: [base, plan, planner]", "planner]",
         {"`planner`, which is no subsystem or device", "`plan`"});
+  wrong("ages: {ego_motion.motion", "ages: {ego_motion.moton", "ego_motion.moton",
+        {"no output of what it runs", "did you mean `ego_motion.motion`"});
+  wrong("ages: {ego_motion.motion", "ages: {planner.velocity", "planner.velocity", {"no output of what it runs"});
   wrong("latency: 5ms", "latency: 0ms", "0ms, clock", {"`latency` of `network` must be above 0"});
   wrong("domain: 7", "domain: 300", "300", {"230"});
   wrong("address: 10.0.0.2, ", "", "legs: {runs", {"address"});
