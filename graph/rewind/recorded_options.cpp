@@ -39,7 +39,7 @@ command::RunOptions recorded_options(const record::LogFile& file, const ReplayOp
                               run.load.params.string())};
   run.load.profile = fact(facts, "profile");
   run.load.mode = fact(facts, "mode");
-  run.load.machine = fact(facts, "machine");
+  run.load.machine = fact(facts, "part");
   run.load.policy = fact(facts, "policy_option");
   std::istringstream settings(fact(facts, "set"));
   for (std::string line; std::getline(settings, line);) run.load.set.push_back(line);
