@@ -146,6 +146,9 @@ std::vector<std::string> Link::summary() const {
                                 import->port, import->from.name, import->received.load(), ms(0.5), ms(0.99),
                                 static_cast<double>(import->latency.max_ns()) / 1e6, what));
   }
+  for (const auto& known : peers_)
+    if (known->clock.jumps() > 0)
+      lines.push_back(fmt::format("the clock of machine {} jumped {} times", known->name, known->clock.jumps()));
   for (size_t i = 0; i < exports_.size(); ++i)
     if (older_[i] > 0)
       lines.push_back(fmt::format("{}: {} messages were older than the {:.1f} ms that other machines count on",
@@ -220,8 +223,8 @@ void Link::send_state() {
   {
     const std::lock_guard lock(mutex_);
     for (const auto& known : peers_)
-      if (known->newest_ns != 0)
-        state.heard[known->name] = {known->newest.run, known->newest.sent_ns, known->newest_ns};
+      if (const int64_t heard_ns = known->heard_ns.load(); heard_ns != INT64_MIN)
+        state.heard[known->name] = {known->newest.run, known->newest.sent_ns, heard_ns};
   }
   state.sent_ns = clock_.now_ns();
   const std::string text = text_of(state);

@@ -53,7 +53,6 @@ bool Peer::hear(const State& state, std::string_view own_name, uint64_t own_run,
   if (const auto mine = state.heard.find(own_name); mine != state.heard.end() && mine->second.run == own_run)
     clock.add({mine->second.sent_ns, mine->second.received_ns, state.sent_ns, now_ns});
   newest = state;
-  newest_ns = now_ns;
   return true;
 }
 

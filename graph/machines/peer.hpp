@@ -49,7 +49,6 @@ class Peer {
   std::atomic<bool> differs{false};          ///< it runs another graph, schedule or other parameters
   ClockPair clock;                           ///< of the hearing thread
   State newest;                              ///< likewise
-  int64_t newest_ns = 0;                     ///< when that came
 
  private:
   const std::string graph_;

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "graph/attach/follow.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
@@ -19,12 +20,6 @@
 
 namespace takt::command {
 namespace {
-
-size_t index_of(const Plan& plan, const std::string& node, const std::string& port) {
-  const auto found = std::find_if(plan.ports.begin(), plan.ports.end(),
-                                  [&](const PortPlan& known) { return known.node == node && known.port == port; });
-  return static_cast<size_t>(found - plan.ports.begin());
-}
 
 /// Of all that must be the same on each machine: program, graph with all its files, schedule, profile and settings.
 std::string same_everywhere(const graph::GraphSpec& graph, const std::vector<std::string>& set) {
@@ -67,11 +62,11 @@ std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const R
   std::vector<machines::Link::ImportName> imports;
   for (const graph::DeviceSpec& device : graph.devices)
     for (const std::string& port : device.remote ? device.remote->ports : std::vector<std::string>())
-      imports.push_back(
-          {device.remote->machine, device.id + "." + port, told(board, index_of(outline.plan, device.id, port))});
+      imports.push_back({device.remote->machine, device.id + "." + port,
+                         told(board, *attach::find_port(outline.plan, device.id + "." + port))});
   std::vector<machines::Link::Export> exports;
   for (const graph::PortName& port : graph.exported)
-    exports.push_back({port.text(), told(board, index_of(outline.plan, port.node, port.port)), age_of(graph, port)});
+    exports.push_back({port.text(), told(board, *attach::find_port(outline.plan, port.text())), age_of(graph, port)});
   return std::make_unique<machines::Link>(std::move(options), imports, std::move(exports),
                                           machines::make_dds_wire(wire), clock);
 }
@@ -84,7 +79,7 @@ void lift_other_threads() {
 void begin(machines::Link& link, const graph::GraphSpec& graph, const Plan& plan, Transport& transport) {
   std::vector<machines::Link::Outgoing> outgoing;
   for (const graph::PortName& port : graph.exported) {
-    const size_t p = index_of(plan, port.node, port.port);
+    const size_t p = *attach::find_port(plan, port.text());
     outgoing.push_back({plan.ports[p].type, transport.make_reader(p)});
   }
   link.begin(std::move(outgoing));

@@ -21,21 +21,23 @@ int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) 
   return code;
 }
 
+tl::expected<std::unique_ptr<Node>, graph::ComposeError> remote_device(const Prepared& prepared,
+                                                                       const graph::DeviceSpec& spec) {
+  if (prepared.remote_source) {
+    auto ports = graph::remote_ports(prepared.registry, *spec.remote);
+    auto source = prepared.remote_source(spec, ports);
+    return std::make_unique<RemoteNode>(std::move(ports), std::move(source));
+  }
+  graph::ComposeError error;
+  error.problems.push_back({spec.position, fmt::format("{} comes from machine {}: a part of a graph runs in real time "
+                                                       "and in several processes only",
+                                                       spec.id, spec.remote->machine)});
+  return tl::make_unexpected(std::move(error));
+}
+
 graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   return [&prepared, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
-    if (spec.remote && !prepared.remote_source) {
-      graph::ComposeError error;
-      error.problems.push_back(
-          {spec.position, fmt::format("{} comes from machine {}: a part of a graph runs in real time and in "
-                                      "several processes only",
-                                      spec.id, spec.remote->machine)});
-      return tl::make_unexpected(std::move(error));
-    }
-    if (spec.remote) {
-      auto ports = graph::remote_ports(prepared.registry, *spec.remote);
-      auto source = prepared.remote_source(spec, ports);
-      return std::make_unique<RemoteNode>(std::move(ports), std::move(source));
-    }
+    if (spec.remote) return remote_device(prepared, spec);
     const hal::DeviceConfig config{spec.id, spec.kind,       spec.driver, spec.settings, prepared.graph->directory,
                                    seed,    prepared.plugged};
     auto node = hal::make_device(prepared.registry.devices, config, prepared.devices, *prepared.clock);

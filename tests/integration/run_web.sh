@@ -2,7 +2,7 @@
 # takt run --web: the page is there before the run, shows it, and goes with it, however it ends.
 source "$(dirname "$0")/lib.sh" "$@"
 [ -x "${takt%/*}/takt-web" ] || { echo "NOT RUN: takt-web is not built, since libwebsockets-dev is missing"; exit 77; }
-port=$((20000 + $$ % 20000))
+port=$((20000 + $$ % 12000))  # below those that the kernel gives to clients
 cp -r "$source/examples/fleet" "$work/"
 echo "web: {port: $port, token_file: token}" >>"$work/fleet/fleet.yaml"
 graph=$work/fleet/fleet.yaml

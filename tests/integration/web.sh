@@ -3,7 +3,7 @@
 # the page in Chromium; and a run that does not notice its end.
 source "$(dirname "$0")/lib.sh" "$@"
 [ -x "${takt%/*}/takt-web" ] || { echo "NOT RUN: takt-web is not built, since libwebsockets-dev is missing"; exit 77; }
-port=$((20000 + $$ % 20000))
+port=$((20000 + $$ % 12000))  # below those that the kernel gives to clients
 
 # serve OPTIONS... : takt web in the background, its process in $web, the address to open in $address, the token in $token.
 serve() {
