@@ -238,8 +238,10 @@ class Composer {
 
   /// Whoever expects something of an output reads it, too, and other machines do: nodes leave out what nobody reads.
   void mark_expected() {
-    for (const PortName& port : graph_.exported)
+    for (const PortName& port : graph_.exported) {
       PortAccess::mark_read(output_of(result_.plan.ports[port_index_.at(port.text())]));
+      result_.plan.tasks[task_index_.at(port.node)].rings = true;
+    }
     if (!graph_.expect) return;
     const auto mark = [&](const ConditionSpec& condition) {
       if (const auto port = port_index_.find(condition.port.text()); port != port_index_.end())

@@ -263,6 +263,7 @@ struct MachineSpec {
   std::string name, address;
   std::vector<std::string> runs;        ///< subsystems and devices
   std::map<std::string, int64_t> ages;  ///< of outputs that others read, when they are published, at most
+  std::map<std::string, std::string> wire;  ///< of outputs that others read: zstd, lz4, jpeg
   Position position;
 };
 

@@ -6,6 +6,7 @@
 
 #include "graph/language/loader.hpp"
 #include "graph/language/part_of_machine.hpp"
+#include "rt/record/picture_codec.hpp"
 
 namespace takt::graph {
 
@@ -30,12 +31,17 @@ void Loader::read_machine(const std::string& name, const json& value) {
   const json runs = value.value("runs", json::array());
   for (const json& one : runs.is_array() ? runs : json::array())
     if (one.is_string()) machine.runs.push_back(one);
-  const json given = value.value("ages", json());
-  const json ages = given.is_object() ? given : json::object();
+  const auto map_of = [&](const char* key) {
+    json map = value.value(key, json());
+    return map.is_object() ? map : json::object();
+  };
+  const json ages = map_of("ages"), wire = map_of("wire");
   for (const auto& [port, ignored] : ages.items())
     if (const auto ns =
             read_time(graph_, ages, child(child("/machines", name), "ages"), port, "machine " + ticked(name)))
       machine.ages[port] = *ns;
+  for (const auto& [port, coding] : wire.items())
+    if (coding.is_string()) machine.wire[port] = coding;
   spec_.machines.push_back(std::move(machine));
 }
 
@@ -87,25 +93,39 @@ void Loader::check_machines() {
     const auto found = home.find(device ? id : part->second.subsystem);
     return found == home.end() ? std::string() : found->second;
   };
-  check_ages(home_of);
+  check_outputs(home_of);
   for (const auto& [id, entry] : spec_.schedule.entries)
     if (entry.on && home_of(id) != home_of(entry.on->node))
       problem(entry.position, fmt::format("{} is released by {}, which another machine runs; give it a rate",
                                           ticked(id), ticked(entry.on->text())));
 }
 
-/// What others count on are outputs of what the machine runs. `home_of`: the machine of a node or device.
-void Loader::check_ages(const std::function<std::string(const std::string&)>& home_of) {
+/// What others count on, and what goes over the network in a coding, are outputs of what the machine runs. `home_of`:
+/// the machine of a node or device.
+void Loader::check_outputs(const std::function<std::string(const std::string&)>& home_of) {
   for (const MachineSpec& machine : spec_.machines) {
+    std::map<std::string, const MessageType*> types;
     std::vector<std::string> outputs;
     for (const auto& [id, part] : parts_)
-      for (const PortInfo& output : home_of(id) == machine.name ? part.outputs : std::vector<PortInfo>())
+      for (const PortInfo& output : home_of(id) == machine.name ? part.outputs : std::vector<PortInfo>()) {
         outputs.push_back(id + "." + output.name);
-    for (const auto& [port, age_ns] : machine.ages)
-      if (std::find(outputs.begin(), outputs.end(), port) == outputs.end())
-        problem(graph_.key_at(child(child(child("/machines", machine.name), "ages"), port)),
-                fmt::format("`ages` of machine {} names {}, which is no output of what it runs{}", ticked(machine.name),
-                            ticked(port), alternatives(port, outputs, "its outputs")));
+        types[outputs.back()] = output.type;
+      }
+    const auto position = [&](const char* key, const std::string& port) {
+      return graph_.key_at(child(child(child("/machines", machine.name), key), port));
+    };
+    const auto is_output = [&](const char* key, const std::string& port) {
+      if (types.contains(port)) return true;
+      problem(position(key, port),
+              fmt::format("{} of machine {} names {}, which is no output of what it runs{}", ticked(key),
+                          ticked(machine.name), ticked(port), alternatives(port, outputs, "its outputs")));
+      return false;
+    };
+    for (const auto& [port, age_ns] : machine.ages) is_output("ages", port);
+    for (const auto& [port, coding] : machine.wire)
+      if (is_output("wire", port) && coding == "jpeg" && types[port] && !record::may_have_pictures(types[port]->fields))
+        problem(position("wire", port),
+                fmt::format("{} has no pictures (it is a {}); give zstd or lz4", ticked(port), types[port]->name));
   }
 }
 

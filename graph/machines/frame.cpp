@@ -8,19 +8,22 @@
 namespace takt::machines {
 namespace {
 
-constexpr uint32_t kMagic = 0x31744B54;  // "TKt1"
+constexpr uint32_t kMagic = 0x32744B54;  // "TKt2"
 constexpr size_t kHash = sizeof(uint64_t);
 
 }  // namespace
 
-void put(uint64_t run, const MessageType& type, const Held& held, std::vector<std::byte>& to) {
-  const size_t from = to.size();
-  mcap::ByteWriter out(to);
+std::span<const std::byte> Framer::frame(uint64_t run, const Held& held) {
+  packed_.clear(), frame_.clear();
+  record::pack(*type_, held.message(), packed_);
+  const auto coded = coder_.code(*type_, packed_);
+  mcap::ByteWriter out(frame_);
   out.number(kMagic), out.number(run), out.number(held.sequence);
   out.number(static_cast<uint64_t>(held.stamp_ns)), out.number(static_cast<uint64_t>(held.header->published_ns));
-  out.number(static_cast<uint32_t>(held.header->level));
-  record::pack(type, held.message(), to);
-  mcap::ByteWriter(to).number(record::hash_of(std::span(to).subspan(from)));
+  out.number(static_cast<uint32_t>(held.header->level)), out.number(static_cast<uint32_t>(coder_.coding()));
+  frame_.insert(frame_.end(), coded.begin(), coded.end());
+  out.number(record::hash_of(frame_));
+  return frame_;
 }
 
 tl::expected<Frame, std::string> frame_of(std::span<const std::byte> bytes) {
@@ -36,7 +39,10 @@ tl::expected<Frame, std::string> frame_of(std::span<const std::byte> bytes) {
     frame.stamp_ns = static_cast<int64_t>(in.number<uint64_t>());
     frame.published_ns = static_cast<int64_t>(in.number<uint64_t>());
     frame.level = static_cast<int32_t>(in.number<uint32_t>());
-    frame.packed = in.bytes(in.left());
+    const auto coding = in.number<uint32_t>();
+    if (coding > static_cast<uint32_t>(Coding::jpeg)) return tl::make_unexpected(std::string("in an unknown coding"));
+    frame.coding = static_cast<Coding>(coding);
+    frame.coded = in.bytes(in.left());
   } catch (const mcap::TooShort& problem) {
     return tl::make_unexpected(std::string(problem.what()));
   }

@@ -7,6 +7,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "graph/machines/coding.hpp"
 #include "rt/msg/field.hpp"
 #include "rt/shm/transport.hpp"
 
@@ -19,11 +20,25 @@ struct Frame {
   uint64_t sequence = 0;
   int64_t stamp_ns = 0, published_ns = 0;
   int32_t level = 0;
-  std::span<const std::byte> packed;  ///< fields as rt/record/packed_message.hpp has them
+  Coding coding = Coding::plain;
+  std::span<const std::byte> coded;  ///< fields as rt/record/packed_message.hpp has them, in that coding
 };
 
-/// Appends the message that is held.
-void put(uint64_t run, const MessageType& type, const Held& held, std::vector<std::byte>& to);
+/// Makes frames of the messages of one output. Keeps its memory from message to message. One thread at a time.
+///
+///   Framer framer(MessageType::of<Image>(), Coding::zstd);
+///   wire.send(topic, framer.frame(run, held));
+class Framer {
+ public:
+  Framer(const MessageType& type, Coding coding) : type_(&type), coder_(coding) {}
+  /// Valid until the next call.
+  std::span<const std::byte> frame(uint64_t run, const Held& held);
+
+ private:
+  const MessageType* type_;
+  Coder coder_;
+  std::vector<std::byte> packed_, frame_;
+};
 
 /// Error: what came is none, or its bytes are not those that were sent (XXH3).
 tl::expected<Frame, std::string> frame_of(std::span<const std::byte> bytes);

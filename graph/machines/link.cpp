@@ -8,7 +8,6 @@
 #include <chrono>
 #include <thread>
 
-#include "graph/machines/frame.hpp"
 #include "rt/record/packed_message.hpp"
 #include "rt/sched/histogram.hpp"
 
@@ -18,8 +17,6 @@ namespace {
 constexpr int64_t kStateEvery_ns = 100'000'000;
 constexpr int64_t kSilent_ns = 3 * kStateEvery_ns;  ///< then a machine is lost
 constexpr int64_t kTold_ns = 1'000'000'000;         ///< so long a trouble is told
-constexpr int64_t kPatience_ns = 20'000'000;
-constexpr auto kLook = std::chrono::microseconds(200);
 constexpr auto kTellAgain = std::chrono::seconds(10);
 
 std::string topic_name(std::string_view graph, std::string_view machine, std::string_view what) {
@@ -34,7 +31,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 
 }  // namespace
 
-/// Counts are of the taking thread; others read them.
+/// Counts are of the wire that calls; others read them.
 struct Link::Import {
   Import(Peer& from, const ImportName& name) : from(from), port(name.port), remembered(name.remembered) {}
   Peer& from;
@@ -45,7 +42,8 @@ struct Link::Import {
   std::atomic<Inbox*> inbox{nullptr};  ///< null: nobody takes messages yet
   uint64_t run = 0;
   Arrivals arrivals;
-  Histogram latency;  ///< from publication there to arrival here
+  std::vector<std::byte> decoded;  ///< the last message, if it came in a coding
+  Histogram latency;               ///< from publication there to arrival here
   std::atomic<uint64_t> received{0}, missing{0}, damaged{0}, late{0}, no_room{0}, unknown_clock{0};
   std::atomic<int64_t> late_at_ns{INT64_MIN}, unknown_at_ns{INT64_MIN};  ///< the last one
 };
@@ -100,9 +98,10 @@ class Link::Source final : public RemoteSource {
 };
 
 Link::Link(Options options, const std::vector<ImportName>& imports, std::vector<Export> exports,
-           std::unique_ptr<Wire> wire, const Clock& clock)
+           std::unique_ptr<Wire> wire, Doorbell& bell, const Clock& clock)
     : options_(std::move(options)),
       exports_(std::move(exports)),
+      bell_(bell),
       clock_(clock),
       run_(static_cast<uint64_t>(std::chrono::system_clock::now().time_since_epoch() / std::chrono::microseconds(1))),
       wire_(std::move(wire)) {
@@ -118,15 +117,16 @@ Link::Link(Options options, const std::vector<ImportName>& imports, std::vector<
   for (const Export& one : exports_)
     out_topics_.push_back(wire_->sends({topic_name(options_.graph, options_.machine, one.port)}));
   older_.resize(exports_.size());
-  taking_ = OwnThread([this](const std::stop_token& end) { take_on(end); });
+  wire_->begin([this](size_t topic, std::span<const std::byte> bytes) { take(topic, bytes); });
   sending_ = OwnThread([this](const std::stop_token& end) { send_on(end); });
 }
 
 Link::~Link() {
   give_up();
-  sending_.request_stop(), taking_.request_stop();
+  sending_.request_stop();
+  bell_.ring();
   if (sending_.joinable()) sending_.join();
-  if (taking_.joinable()) taking_.join();
+  wire_.reset();  // nothing comes any more
   if (!options_.say) return;
   for (const std::string& line : summary()) options_.say(line);
 }
@@ -172,6 +172,7 @@ std::unique_ptr<RemoteSource> Link::source(const std::string& machine, const std
 void Link::begin(std::vector<Outgoing> outgoing) {
   outgoing_ = std::move(outgoing);
   begun_.store(true, std::memory_order_release);
+  bell_.ring();
 }
 
 void Link::give_up() {
@@ -195,25 +196,28 @@ Capacity Link::fact(const Peer& of, const std::string& port) {
 void Link::send_on(const std::stop_token& end) {
   pthread_setname_np(pthread_self(), "takt-send");
   std::vector<Follower> followers;
-  std::vector<std::byte> frame;
+  std::vector<Framer> framers;
   for (int64_t next_state_ns = 0; !end.stop_requested();) {
+    const uint32_t heard = bell_.rung();
     if (const int64_t now_ns = clock_.now_ns(); now_ns >= next_state_ns) {
       send_state();
       next_state_ns = now_ns + kStateEvery_ns;
     }
     if (followers.empty() && begun_.load(std::memory_order_acquire))
-      for (Outgoing& one : outgoing_) followers.emplace_back(std::move(one.reader));
-    for (size_t i = 0; i < followers.size(); ++i) followers[i].take([&](const Held& held) { send(i, held, frame); });
-    std::this_thread::sleep_for(kLook);
+      for (size_t i = 0; i < outgoing_.size(); ++i) {
+        followers.emplace_back(std::move(outgoing_[i].reader));
+        framers.emplace_back(*outgoing_[i].type, exports_[i].coding);
+      }
+    for (size_t i = 0; i < followers.size(); ++i)
+      followers[i].take([&](const Held& held) { send(i, held, framers[i]); });
+    bell_.wait(heard, next_state_ns - clock_.now_ns());
   }
 }
 
-void Link::send(size_t i, const Held& held, std::vector<std::byte>& frame) {
+void Link::send(size_t i, const Held& held, Framer& framer) {
   if (const auto& age_ns = exports_[i].age_ns; age_ns && held.header->published_ns - held.stamp_ns > *age_ns)
     ++older_[i];
-  frame.clear();
-  put(run_, *outgoing_[i].type, held, frame);
-  wire_->send(out_topics_[i], frame);
+  wire_->send(out_topics_[i], framer.frame(run_, held));
 }
 
 void Link::send_state() {
@@ -231,13 +235,9 @@ void Link::send_state() {
   wire_->send(state_topic_, bytes_of(text));
 }
 
-void Link::take_on(const std::stop_token& end) {
-  pthread_setname_np(pthread_self(), "takt-take");
-  while (!end.stop_requested())
-    wire_->take(kPatience_ns, [this](size_t topic, std::span<const std::byte> bytes) {
-      if (topic < peers_.size()) take_state(bytes);
-      else take_message(*imports_[topic - peers_.size()], bytes);
-    });
+void Link::take(size_t topic, std::span<const std::byte> bytes) {
+  if (topic < peers_.size()) take_state(bytes);
+  else take_message(*imports_[topic - peers_.size()], bytes);
 }
 
 void Link::take_state(std::span<const std::byte> bytes) {
@@ -275,15 +275,16 @@ void Link::take_message(Import& import, std::span<const std::byte> bytes) {
     import.late.fetch_add(1);
     import.late_at_ns.store(now_ns);
   }
-  fill(import, frame->stamp_ns - there->offset_ns, std::max(visible_ns, now_ns), frame->packed);
+  fill(import, frame->stamp_ns - there->offset_ns, std::max(visible_ns, now_ns), *frame);
 }
 
-void Link::fill(Import& import, int64_t stamp_ns, int64_t visible_ns, std::span<const std::byte> packed) {
+void Link::fill(Import& import, int64_t stamp_ns, int64_t visible_ns, const Frame& frame) {
   Inbox* const inbox = import.inbox.load(std::memory_order_acquire);
   if (inbox == nullptr) return;
   Inbox::Message* const message = inbox->to_fill();
   if (message == nullptr) return static_cast<void>(import.no_room.fetch_add(1));
-  if (!record::unpack(*import.type, packed, message->memory.get()))
+  const auto packed = decoded(frame.coding, frame.coded, inbox->message_bytes(), import.decoded);
+  if (!packed || !record::unpack(*import.type, *packed, message->memory.get()))
     return static_cast<void>(import.damaged.fetch_add(1));
   message->stamp_ns = stamp_ns;
   message->visible_at_ns = visible_ns;

@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "graph/machines/arrivals.hpp"
+#include "graph/machines/frame.hpp"
 #include "graph/machines/peer.hpp"
 #include "graph/machines/wire.hpp"
 #include "hal/remote/remote_node.hpp"
 #include "rt/own_thread.hpp"
+#include "rt/shm/doorbell.hpp"
 #include "rt/shm/follower.hpp"
 #include "rt/time/clock.hpp"
 
@@ -22,7 +24,7 @@ namespace takt::machines {
 /// The end of this machine of what a graph has between machines: sends what others read, and hands what they send to
 /// the jobs of RemoteNodes. In a process of its own, so that what goes wrong with the network ends nothing else.
 ///
-///   Link link(options, imports, exports, make_dds_wire({address}), clock);
+///   Link link(options, imports, exports, make_dds_wire({address}), board.published(), clock);
 ///   RemoteNode node(ports, link.source("vision", "stereo", ports));   // in compose; its setup waits for that machine
 ///   link.begin(outgoing);                                             // messages go out
 ///
@@ -44,6 +46,7 @@ class Link {
     std::string port;  ///< NODE.PORT
     std::function<std::optional<Capacity>()> capacity;
     std::optional<int64_t> age_ns = {};  ///< that others count on when it is published
+    Coding coding = Coding::plain;
   };
   /// An output of another machine that nodes here read.
   struct ImportName {
@@ -57,7 +60,7 @@ class Link {
     std::unique_ptr<Reader> reader;
   };
   Link(Options options, const std::vector<ImportName>& imports, std::vector<Export> exports, std::unique_ptr<Wire> wire,
-       const Clock& clock);
+       Doorbell& bell, const Clock& clock);
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
@@ -77,22 +80,23 @@ class Link {
   /// A line for each output of others that came, and of this one's that were not as they should be, once the threads
   /// have ended.
   std::vector<std::string> summary() const;
-  void send(size_t export_index, const Held& held, std::vector<std::byte>& frame);
+  void send(size_t export_index, const Held& held, Framer& framer);
   Peer& peer(std::string_view name);
   void send_on(const std::stop_token& end);
   void send_state();
-  void take_on(const std::stop_token& end);
+  void take(size_t topic, std::span<const std::byte> bytes);
   void take_state(std::span<const std::byte> bytes);
   void take_message(Import& import, std::span<const std::byte> bytes);
-  void fill(Import& import, int64_t stamp_ns, int64_t visible_ns, std::span<const std::byte> packed);
+  void fill(Import& import, int64_t stamp_ns, int64_t visible_ns, const Frame& frame);
   /// Waits.
   Capacity fact(const Peer& of, const std::string& port);
 
   const Options options_;
   const std::vector<Export> exports_;
+  Doorbell& bell_;  ///< rings when there is something to send
   const Clock& clock_;
   const uint64_t run_;
-  const std::unique_ptr<Wire> wire_;
+  std::unique_ptr<Wire> wire_;
   std::vector<std::unique_ptr<Peer>> peers_;
   std::vector<std::unique_ptr<Import>> imports_;
   std::mutex mutex_;  ///< states of peers; never taken in a job
@@ -103,7 +107,7 @@ class Link {
   size_t state_topic_ = 0;
   bool gave_up_ = false;
   std::atomic<bool> begun_{false};
-  OwnThread sending_, taking_;
+  OwnThread sending_;
 };
 
 }  // namespace takt::machines

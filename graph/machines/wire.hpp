@@ -10,8 +10,8 @@
 namespace takt::machines {
 
 /// Carries bytes between machines by topic; what is sent may be lost unless the topic is reliable. Sending may take
-/// tens of milliseconds: never in a job. Topics are made before the first message; send() on one thread, take() on
-/// another.
+/// tens of milliseconds: never in a job. Topics are made before begin() and the first message; send() on one thread at
+/// a time.
 class Wire {
  public:
   virtual ~Wire() = default;
@@ -20,10 +20,12 @@ class Wire {
     bool reliable = false;  ///< the newest message comes again until it has arrived, also to who joins late
   };
   virtual size_t sends(const Topic& topic) = 0;  ///< its number for send()
-  virtual size_t takes(const Topic& topic) = 0;  ///< its number in take()
+  virtual size_t takes(const Topic& topic) = 0;  ///< its number for `each`
   virtual void send(size_t topic, std::span<const std::byte> bytes) = 0;
-  /// Waits until something comes, at most so long; then each(topic, bytes) for all that is there.
-  virtual void take(int64_t patience_ns, const std::function<void(size_t, std::span<const std::byte>)>& each) = 0;
+  /// From here on each(topic, bytes) for what comes, one call at a time, on threads of the wire: no message waits for
+  /// another thread to wake up. The last call has ended when the wire is destroyed.
+  using Each = std::function<void(size_t topic, std::span<const std::byte> bytes)>;
+  virtual void begin(Each each) = 0;
 };
 
 struct WireOptions {

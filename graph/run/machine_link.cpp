@@ -29,12 +29,6 @@ std::string same_everywhere(const graph::GraphSpec& graph, const std::vector<std
   return fmt::format("{:016x}", record::hash_of(std::as_bytes(std::span(all.data(), all.size()))));
 }
 
-std::optional<int64_t> age_of(const graph::GraphSpec& graph, const graph::PortName& port) {
-  for (const graph::MachineSpec& machine : graph.machines)
-    if (const auto age = machine.ages.find(port.text()); age != machine.ages.end()) return age->second;
-  return std::nullopt;
-}
-
 std::function<std::optional<Capacity>()> told(RunBoard& board, size_t port) {
   return [&record = board.capacity(port)]() -> std::optional<Capacity> {
     if (record.known.load(std::memory_order_acquire) != CapacityRecord::kTold) return std::nullopt;
@@ -65,10 +59,16 @@ std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const R
       imports.push_back({device.remote->machine, device.id + "." + port,
                          told(board, *attach::find_port(outline.plan, device.id + "." + port))});
   std::vector<machines::Link::Export> exports;
-  for (const graph::PortName& port : graph.exported)
-    exports.push_back({port.text(), told(board, *attach::find_port(outline.plan, port.text())), age_of(graph, port)});
+  const graph::MachineSpec& own = *std::find_if(graph.machines.begin(), graph.machines.end(),
+                                                [&](const auto& machine) { return machine.name == graph.machine; });
+  for (const graph::PortName& port : graph.exported) {
+    auto& one = exports.emplace_back(port.text(), told(board, *attach::find_port(outline.plan, port.text())));
+    if (const auto age = own.ages.find(port.text()); age != own.ages.end()) one.age_ns = age->second;
+    if (const auto wire = own.wire.find(port.text()); wire != own.wire.end())
+      one.coding = *machines::coding_of(wire->second);
+  }
   return std::make_unique<machines::Link>(std::move(options), imports, std::move(exports),
-                                          machines::make_dds_wire(wire), clock);
+                                          machines::make_dds_wire(wire), board.published(), clock);
 }
 
 void lift_other_threads() {

@@ -86,6 +86,7 @@ struct TaskPlan {
   std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
   std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports
   Disturbance* disturbance = nullptr;      ///< null: none
+  bool rings = false;                      ///< its messages ring the board's doorbell: other machines wait for them
   int64_t state_every_ns = 0;              ///< its last output, `state`, has one message in so much time; 0: none
 };
 

@@ -20,6 +20,7 @@
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
 #include "rt/shm/commit_ring.hpp"
+#include "rt/shm/doorbell.hpp"
 #include "rt/shm/kill_order.hpp"
 
 namespace takt {
@@ -199,6 +200,9 @@ class RunBoard {
   LateSourceLog& late_sources() { return shared_->late_sources; }
   const LateSourceLog& late_sources() const { return shared_->late_sources; }
 
+  /// Rung by tasks whose messages somebody waits for (TaskPlan::rings).
+  Doorbell& published() { return shared_->published; }
+
   /// Set by the process that answers those who attach.
   MarkLog& marks() { return supervised_->marks; }
   const MarkLog& marks() const { return supervised_->marks; }
@@ -223,6 +227,7 @@ class RunBoard {
     alignas(kCacheLine) ExcessLog excesses;
     alignas(kCacheLine) OverrunLog overruns;
     alignas(kCacheLine) LateSourceLog late_sources;
+    Doorbell published;
   };
   /// What the supervisor writes, and a run without one.
   struct alignas(kCacheLine) Supervised {

@@ -71,6 +71,7 @@ CommitRing::Filled Task::commit(const CommitRing::Terms& terms, Offer offer) {
     reached(MessageStep::after_commit, plan_.ports[i]);
     if (offered(i)) settle_output(i, out, offer);
   }
+  if (plan_.rings) board_.published().ring();
   return out;
 }
 

@@ -22,10 +22,6 @@
 // it read the word has read the word of that commit, and a successor has to look at the newest commit only. The number
 // in an open word makes a slow reader's attempt to fill it fail, if the word has been used again.
 //
-// The doorbell of `on` edges between processes will be this ring as well: a futex on a 32-bit count of filled commits
-// beside `newest_` (its cache line has room), rung after fill(). A follower takes the instants of the commits that it
-// has not seen from their words; it may be kWords - 1 commits behind. A producer's successor goes on with the numbers.
-//
 // Plain data: it lies on the run board, which all processes of a run share. One producer at a time; any readers.
 #pragma once
 #include <algorithm>

@@ -2,7 +2,9 @@
 #include <dds/dds.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -36,9 +38,8 @@ class DdsWire final : public Wire {
   explicit DdsWire(const WireOptions& options)
       : domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
                      fmt::format("domain on {}; is that address one of this machine?", options.address))),
-        participant_(
-            made(dds_create_participant(static_cast<dds_domainid_t>(options.domain), nullptr, nullptr), "participant")),
-        waitset_(made(dds_create_waitset(participant_), "waitset")) {}
+        participant_(made(dds_create_participant(static_cast<dds_domainid_t>(options.domain), nullptr, nullptr),
+                          "participant")) {}
   ~DdsWire() override { dds_delete(domain_); }  // with all in it
 
   size_t sends(const Topic& topic) override {
@@ -55,8 +56,6 @@ class DdsWire final : public Wire {
             topic,
             [&](const dds_qos_t* qos) { return dds_create_reader(participant_, topic_of(topic, qos), qos, nullptr); }),
         "reader");
-    const dds_entity_t fresh = made(dds_create_readcondition(reader, DDS_ANY_STATE), "condition");
-    dds_waitset_attach(waitset_, fresh, static_cast<dds_attach_t>(readers_.size()));
     readers_.push_back(reader);
     return readers_.size() - 1;
   }
@@ -68,11 +67,19 @@ class DdsWire final : public Wire {
     dds_write(writers_[topic], &sample);  // what could not be sent is missing there, and counted
   }
 
-  void take(int64_t patience_ns, const std::function<void(size_t, std::span<const std::byte>)>& each) override {
-    std::array<dds_attach_t, kAtOnce> ready{};
-    const dds_return_t count = dds_waitset_wait(waitset_, ready.data(), ready.size(), patience_ns);
-    if (count <= 0) return;
-    for (size_t topic = 0; topic < readers_.size(); ++topic) take_all(topic, each);
+  void begin(Each each) override {
+    {
+      const std::lock_guard lock(taking_);
+      each_ = std::move(each);
+    }
+    dds_listener_t* const listener = dds_create_listener(this);
+    dds_lset_data_available(listener,
+                            [](dds_entity_t reader, void* wire) { static_cast<DdsWire*>(wire)->take_all(reader); });
+    for (const dds_entity_t reader : readers_) {
+      dds_set_listener(reader, listener);
+      take_all(reader);  // what came before
+    }
+    dds_delete_listener(listener);
   }
 
  private:
@@ -95,23 +102,27 @@ class DdsWire final : public Wire {
     return made(dds_create_topic(participant_, &takt_Bytes_desc, topic.name.c_str(), qos, nullptr), "topic");
   }
 
-  void take_all(size_t topic, const std::function<void(size_t, std::span<const std::byte>)>& each) {
+  void take_all(dds_entity_t reader) {
+    const std::lock_guard lock(taking_);
+    const auto topic = static_cast<size_t>(std::find(readers_.begin(), readers_.end(), reader) - readers_.begin());
     std::array<void*, kAtOnce> samples{};
     std::array<dds_sample_info_t, kAtOnce> infos;
     for (;;) {
-      const dds_return_t count = dds_take(readers_[topic], samples.data(), infos.data(), kAtOnce, kAtOnce);
+      const dds_return_t count = dds_take(reader, samples.data(), infos.data(), kAtOnce, kAtOnce);
       if (count <= 0) return;
       for (int i = 0; i < count; ++i) {
         if (!infos[static_cast<size_t>(i)].valid_data) continue;
         const auto& data = static_cast<const takt_Bytes*>(samples[static_cast<size_t>(i)])->data;
-        each(topic, std::as_bytes(std::span(data._buffer, data._length)));
+        each_(topic, std::as_bytes(std::span(data._buffer, data._length)));
       }
-      dds_return_loan(readers_[topic], samples.data(), count);
+      dds_return_loan(reader, samples.data(), count);
     }
   }
 
-  const dds_entity_t domain_, participant_, waitset_;
+  const dds_entity_t domain_, participant_;
   std::vector<dds_entity_t> writers_, readers_;
+  std::mutex taking_;  ///< several threads of DDS receive
+  Each each_;
 };
 
 std::unique_ptr<Wire> make(const WireOptions& options) { return std::make_unique<DdsWire>(options); }

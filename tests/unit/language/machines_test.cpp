@@ -114,6 +114,13 @@ TEST_CASE("Each subsystem and device runs on one machine, with what releases its
   wrong("ages: {ego_motion.motion", "ages: {ego_motion.moton", "ego_motion.moton",
         {"no output of what it runs", "did you mean `ego_motion.motion`"});
   wrong("ages: {ego_motion.motion", "ages: {planner.velocity", "planner.velocity", {"no output of what it runs"});
+  const auto wire = [](const char* text, const char* at, std::vector<std::string> words) {
+    const std::string ages = "ages: {ego_motion.motion: 250ms}";
+    wrong(ages, ages + ", wire: {" + text + "}", at, std::move(words));
+  };
+  wire("ego_motion.motion: jpeg", "ego_motion.motion: jpeg", {"has no pictures", "give zstd or lz4"});
+  wire("planner.velocity: zstd", "planner.velocity: zstd", {"`wire` of machine `eyes`", "no output of what it runs"});
+  wire("ego_motion.motion: rar", "rar", {"lz4"});
   wrong("latency: 5ms", "latency: 0ms", "0ms, clock", {"`latency` of `network` must be above 0"});
   wrong("domain: 7", "domain: 300", "300", {"230"});
   wrong("address: 10.0.0.2, ", "", "legs: {runs", {"address"});

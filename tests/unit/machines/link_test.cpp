@@ -8,9 +8,9 @@
 #include <chrono>
 #include <thread>
 
-#include "graph/machines/frame.hpp"
 #include "memory_wire.hpp"
 #include "rt/msg/grid.hpp"
+#include "rt/record/packed_message.hpp"
 
 using namespace takt;
 using namespace takt::machines;
@@ -38,7 +38,12 @@ struct Chunk {
 struct Publisher {
   std::mutex mutex;
   std::vector<std::unique_ptr<Chunk>> sent;
+  Doorbell bell;
   void publish(int64_t stamp_ns, int64_t published_ns) {
+    put(stamp_ns, published_ns);
+    bell.ring();
+  }
+  void put(int64_t stamp_ns, int64_t published_ns) {
     const std::lock_guard lock(mutex);
     auto& chunk = *sent.emplace_back(std::make_unique<Chunk>());
     *chunk.header() = {};
@@ -80,6 +85,7 @@ struct Pair {
   OwnClock there{0}, here{7'000'000'000};
   std::atomic<bool> set_up{true};
   Publisher publisher;
+  Doorbell unrung;
   std::string same_here = "h", same_there = "h";
   std::vector<std::string> said;
   std::unique_ptr<Link> vision, robot;
@@ -90,7 +96,7 @@ struct Pair {
         Link::Options{"ace", "vision", same_there, {"robot"}, kLatency_ns, kClockError_ns, {}},
         std::vector<Link::ImportName>{},
         std::vector<Link::Export>{{"map.grid", [this] { return set_up ? std::optional(kCapacity) : std::nullopt; }}},
-        std::make_unique<test::MemoryWire>(network), there);
+        std::make_unique<test::MemoryWire>(network), publisher.bell, there);
     std::vector<Link::Outgoing> outgoing(1);
     outgoing[0] = {&type(), std::make_unique<PublishedReader>(publisher)};
     vision->begin(std::move(outgoing));
@@ -104,7 +110,7 @@ struct Pair {
                                                  kClockError_ns,
                                                  [this](const std::string& line) { said.push_back(line); }},
                                    std::vector<Link::ImportName>{{"vision", "map.grid"}}, std::vector<Link::Export>{},
-                                   std::make_unique<test::MemoryWire>(network), here);
+                                   std::make_unique<test::MemoryWire>(network), unrung, here);
     source = robot->source("vision", "map", {{"grid", "", &type()}}, {});
   }
   const Inbox::Message* next() { return source->inbox(0).next(here.now_ns()); }
@@ -182,22 +188,45 @@ TEST_CASE("A machine that runs another graph is named and not listened to; a set
   CHECK(pair.said.front().find("machine vision runs another graph") != std::string::npos);
 }
 
-TEST_CASE("A frame is read as it was sent; a damaged one is told") {
+TEST_CASE("A frame is read as it was sent, in every coding; a damaged one is told") {
   Publisher publisher;
   publisher.publish(11, 12);
   const Held held{publisher.sent[0]->header(), 1, 11, 0, 0};
-  std::vector<std::byte> bytes;
-  put(81, type(), held, bytes);
-  const auto frame = frame_of(bytes);
-  REQUIRE(frame);
-  CHECK(frame->run == 81);
-  CHECK(frame->sequence == 1);
-  CHECK(frame->stamp_ns == 11);
-  CHECK(frame->published_ns == 12);
-  for (size_t i = 0; i < bytes.size(); ++i) {
-    auto damaged = bytes;
-    damaged[i] ^= std::byte{1};
-    CHECK(!frame_of(damaged));
-    CHECK(!frame_of(std::span(bytes).first(i)));
+  std::vector<std::byte> packed;
+  record::pack(type(), held.message(), packed);
+  for (const char* word : {"plain", "zstd", "lz4", "jpeg"}) {
+    CAPTURE(word);
+    Framer framer(type(), *coding_of(word));
+    const auto sent = framer.frame(81, held);
+    const std::vector<std::byte> bytes(sent.begin(), sent.end());
+    const auto frame = frame_of(bytes);
+    REQUIRE(frame);
+    CHECK(frame->run == 81);
+    CHECK(frame->sequence == 1);
+    CHECK(frame->stamp_ns == 11);
+    CHECK(frame->published_ns == 12);
+    std::vector<std::byte> into;
+    const auto again = decoded(frame->coding, frame->coded, packed.size(), into);
+    REQUIRE(again);
+    CHECK(std::vector<std::byte>(again->begin(), again->end()) == packed);
+    for (size_t i = 0; i < bytes.size(); ++i) {
+      auto damaged = bytes;
+      damaged[i] ^= std::byte{1};
+      CHECK(!frame_of(damaged));
+      CHECK(!frame_of(std::span(bytes).first(i)));
+    }
+  }
+  CHECK(!coding_of("png"));
+}
+
+TEST_CASE("What is no message in a coding, or one larger than there is room for, is told") {
+  std::vector<std::byte> packed(5000, std::byte{7}), into;
+  for (const Coding coding : {Coding::zstd, Coding::lz4}) {
+    Coder coder(coding);
+    const auto small = coder.code(type(), packed);
+    CHECK(small.size() < packed.size() / 10);
+    CHECK(decoded(coding, small, packed.size(), into)->size() == packed.size());
+    CHECK(!decoded(coding, small, packed.size() - 1, into));
+    for (size_t length = 0; length < small.size(); ++length) CHECK(!decoded(coding, small.first(length), 5000, into));
   }
 }

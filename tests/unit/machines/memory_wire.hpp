@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A network in memory for tests: what is sent by one machine may be lost on its way to the others.
 #pragma once
-#include <condition_variable>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -14,13 +12,11 @@
 namespace takt::test {
 
 struct Network {
-  using Bytes = std::vector<std::byte>;
   struct End {
     std::vector<std::string> topics;
-    std::deque<std::pair<size_t, Bytes>> arrived;
+    machines::Wire::Each each;
   };
   std::mutex mutex;
-  std::condition_variable changed;
   std::vector<End*> ends;
   std::function<bool(const std::string& topic)> loses = [](const std::string&) { return false; };
 
@@ -33,8 +29,7 @@ struct Network {
     if (loses(topic)) return;
     for (End* end : ends)
       for (size_t i = 0; i < end->topics.size(); ++i)
-        if (end->topics[i] == topic) end->arrived.emplace_back(i, Bytes(bytes.begin(), bytes.end()));
-    changed.notify_all();
+        if (end->topics[i] == topic && end->each) end->each(i, bytes);
   }
 };
 
@@ -54,14 +49,9 @@ class MemoryWire final : public machines::Wire {
     return end_.topics.push_back(topic.name), end_.topics.size() - 1;
   }
   void send(size_t topic, std::span<const std::byte> bytes) override { network_.carry(sent_[topic], bytes); }
-  void take(int64_t patience_ns, const std::function<void(size_t, std::span<const std::byte>)>& each) override {
-    std::deque<std::pair<size_t, Network::Bytes>> all;
-    {
-      std::unique_lock lock(network_.mutex);
-      network_.changed.wait_for(lock, std::chrono::nanoseconds(patience_ns), [&] { return !end_.arrived.empty(); });
-      all.swap(end_.arrived);
-    }
-    for (const auto& [topic, bytes] : all) each(topic, bytes);
+  void begin(Each each) override {
+    const std::lock_guard lock(network_.mutex);
+    end_.each = std::move(each);
   }
 
  private:
