@@ -151,34 +151,61 @@ void Server::serve(int descriptor) {
 
 bool Server::answer(const Json& question, Connection& connection, uint32_t by_user) {
   const std::string what = question.value("do", "");
-  if (what == "top") return connection.write(top());
   if (what == "echo") return echo(question, connection);
   if (what == "describe") return connection.write(describe_json(subject_));
   if (what == "follow") return Follow(subject_, taps_, connection).run(ending_), false;
+  if (what == "carry") return errands_.carry(connection, ending_), false;
+  return connection.write(reply(question, by_user));
+}
+
+std::string Server::machine_of(const Json& question) const {
+  if (const std::string named = question.value("machine", ""); !named.empty()) return named;
+  const std::string about = question.value("param", question.value("device", ""));
+  const auto elsewhere = subject_.graph.elsewhere.find(about.substr(0, about.find('.')));
+  return elsewhere == subject_.graph.elsewhere.end() ? "" : elsewhere->second;
+}
+
+Json Server::reply(const Json& question, uint32_t by_user) {
+  const std::string machine = machine_of(question);
+  std::vector<std::string> names;
+  for (const graph::MachineSpec& one : subject_.graph.machines) names.push_back(one.name);
+  if (!machine.empty() && std::find(names.begin(), names.end(), machine) == names.end())
+    return wrong(fmt::format("there is no machine {}{}", graph::ticked(machine), graph::alternatives(machine, names)));
+  const std::string& own = subject_.graph.machine;
+  if (own.empty() || machine == own) return reply_here(question, by_user);
+  if (!machine.empty()) return errands_.ask(machine, question);
+  const std::string what = question.value("do", "");
+  if (what != "mode" && what != "mark" && what != "stop") return reply_here(question, by_user);
+  Json others = Json::object();  // before this one: it cannot be asked once it has stopped
+  for (const std::string& name : names)
+    if (name != own) others[name] = errands_.ask(name, question);
+  Json all = reply_here(question, by_user);
+  all["machines"] = others;
+  return all;
+}
+
+Json Server::reply_here(const Json& question, uint32_t by_user) {
+  const std::string what = question.value("do", "");
+  if (what == "top") return top();
   if (!subject_.replay_of.empty() && changes(question))
-    return connection.write(
-        wrong(fmt::format("this is a replay of {}: it can be looked at, and stopped", subject_.replay_of)));
-  if (what == "mode") return connection.write(change_mode(question.value("mode", "")));
-  if (what == "get") return connection.write(get(question.value("param", "")));
+    return wrong(fmt::format("this is a replay of {}: it can be looked at, and stopped", subject_.replay_of));
+  if (what == "mode") return change_mode(question.value("mode", ""));
+  if (what == "get") return get(question.value("param", ""));
   if (what == "set")
-    return connection.write(
-        set(question.value("param", ""), {question.value("value", ""), question.value("keep", false), by_user}));
+    return set(question.value("param", ""), {question.value("value", ""), question.value("keep", false), by_user});
   if (what == "fault") {
     const std::string device = question.value("device", ""), fault = question.value("fault", "");
-    return connection.write(fault.empty() ? faults(device)
-                                          : switch_fault(device, fault, question.value("on", true), by_user));
+    return fault.empty() ? faults(device) : switch_fault(device, fault, question.value("on", true), by_user);
   }
-  if (what == "answer")
-    return connection.write(give_answer(question.value("device", ""), question.value("text", ""), by_user));
-  if (what == "forget") return connection.write(forget(question.value("param", "")));
-  if (what == "mark") return connection.write(mark(question.value("words", ""), by_user));
+  if (what == "answer") return give_answer(question.value("device", ""), question.value("text", ""), by_user);
+  if (what == "forget") return forget(question.value("param", ""));
+  if (what == "mark") return mark(question.value("words", ""), by_user);
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
-    return connection.write({{"ok", true}});
+    return {{"ok", true}};
   }
-  return connection.write(
-      wrong("unknown question " + what +
-            "; known: top, echo, describe, follow, get, set, forget, fault, answer, mark, mode, stop"));
+  return wrong("unknown question " + what +
+               "; known: top, echo, describe, follow, get, set, forget, fault, answer, mark, mode, stop");
 }
 
 Json Server::mark(const std::string& words, uint32_t by_user) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/attach/errands.hpp"
 #include "graph/attach/subject.hpp"
 #include "graph/attach/taps.hpp"
 #include "rt/own_thread.hpp"
@@ -38,6 +39,11 @@ class Server {
   void serve(int descriptor);
   /// `by_user`: the uid of who asks.
   bool answer(const nlohmann::ordered_json& question, Connection& connection, uint32_t by_user);
+  /// To what is answered at once, by this machine or by those that the question is for.
+  nlohmann::ordered_json reply(const nlohmann::ordered_json& question, uint32_t by_user);
+  nlohmann::ordered_json reply_here(const nlohmann::ordered_json& question, uint32_t by_user);
+  /// The machine that a question names, or that has what it is about; empty: none does.
+  std::string machine_of(const nlohmann::ordered_json& question) const;
   nlohmann::ordered_json top() const;
   bool echo(const nlohmann::ordered_json& question, Connection& connection);
   /// `as`: "png", "ply" or "", for text alone; `items`: of longer arrays so many elements.
@@ -80,6 +86,7 @@ class Server {
   std::atomic<bool> ending_{false};
   std::mutex setting_, keeping_;
   Taps taps_;
+  Errands errands_;
   std::list<Client> clients_;
   OwnThread thread_;
 };

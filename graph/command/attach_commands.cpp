@@ -49,14 +49,21 @@ std::string top_text(const Json& top) {
   return text;
 }
 
+Json to_machine(const AttachOptions& options, Json question) {
+  if (!options.machine.empty()) question["machine"] = options.machine;
+  return question;
+}
+
 int run_top(const AttachOptions& options) {
   auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
-  if (isatty(STDOUT_FILENO) != 0 && !options.once && !options.json) return top::show(std::move(*connection));
+  if (isatty(STDOUT_FILENO) != 0 && !options.once && !options.json && options.machine.empty())
+    return top::show(std::move(*connection));
   for (bool first = true;; first = false) {
-    if (!connection->write({{"do", "top"}})) return kOk;  // the run has ended, as runs do
+    if (!connection->write(to_machine(options, {{"do", "top"}}))) return kOk;  // the run has ended, as runs do
     const auto line = connection->read_line();
     if (!line) return first ? refuse("the run does not answer", kDeviceOrSystem) : kOk;
+    if (line->contains("error")) return refuse(line->at("error").get<std::string>(), kBadInput);
     std::fputs(options.json ? (line->dump() + "\n").c_str() : top_text(*line).c_str(), stdout);
     std::fflush(stdout);
     if (options.once || output_gone()) return kOk;
@@ -93,14 +100,19 @@ int run_question(const AttachOptions& options, const Json& question) {
   auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   Json answer;
-  return ask(*connection, question, answer);
+  int code = ask(*connection, to_machine(options, question), answer);
+  const Json machines = answer.value("machines", Json::object());
+  for (const auto& [machine, told] : machines.items())
+    if (told.contains("error"))
+      code = std::max(code, refuse(machine + ": " + told["error"].get<std::string>(), kDeviceOrSystem));
+  return code;
 }
 
 int run_get(const AttachOptions& options) {
   auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   Json answer;
-  const int code = ask(*connection, {{"do", "get"}, {"param", options.param}}, answer);
+  const int code = ask(*connection, to_machine(options, {{"do", "get"}, {"param", options.param}}), answer);
   if (code != kOk) return code;
   const Json& parameters = answer.at("parameters");
   if (options.json) std::printf("%s\n", parameters.dump(2).c_str());
@@ -159,7 +171,7 @@ int run_set(plugin::Plugins& plugins, AttachOptions& options) {
       options.forget ? Json{{"do", "forget"}, {"param", options.param}}
                      : Json{{"do", "set"}, {"param", options.param}, {"value", options.value}, {"keep", options.keep}};
   Json answer;
-  const int code = ask(*connection, question, answer);
+  const int code = ask(*connection, to_machine(options, question), answer);
   if (answer.contains("kept")) std::fprintf(stderr, "takt: kept in %s\n", answer["kept"].get<std::string>().c_str());
   if (answer.contains("forgotten"))
     std::fprintf(stderr, "takt: taken out of %s; this run goes on with the value it has\n",
@@ -183,7 +195,7 @@ int run_fault(const AttachOptions& options) {
   Json question{{"do", "fault"}, {"device", options.device}};
   if (!options.fault.empty()) question.update({{"fault", options.fault}, {"on", options.on == "on"}});
   Json answer;
-  const int code = ask(*connection, question, answer);
+  const int code = ask(*connection, to_machine(options, question), answer);
   if (code != kOk || !options.fault.empty()) return code;
   const Json& devices = answer.at("devices");
   if (options.json) std::printf("%s\n", devices.dump(2).c_str());
@@ -196,6 +208,10 @@ CLI::App* add(CLI::App& app, const char* name, const char* purpose, AttachOption
   CLI::App* command = app.add_subcommand(name, purpose);
   command->add_option("--run", o.run, "process id of the run, where there are several");
   return command;
+}
+
+void for_a_machine(CLI::App* command, AttachOptions& o) {
+  command->add_option("--machine", o.machine, "that of a graph on several; left out: the one that has it, or all");
 }
 
 }  // namespace
@@ -244,6 +260,7 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
       "ends it.\n"
       "Elsewhere it prints a table every half second. NO_COLOR=1 takes the colours away.");
   top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
+  for_a_machine(top, o);
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();
   CLI::Option* png = writes_file(echo->add_option("--png", o.png, "writes the message as a picture"));
@@ -252,11 +269,13 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   echo->footer("Example: takt echo stereo.disparity --png disparity.png");
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
   CLI::App* get = add(app, "get", "shows a parameter of a running graph, or all that differ from its file", o);
+  for_a_machine(get, o);
   get->add_option("param", o.param, "NODE.PARAM");
   get->add_flag("--json", o.json, "prints JSON");
   get->footer("Example: takt get obstacle_stop.deceleration");
   get->callback([&] { exit_code = understood([&] { return run_get(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
+  for_a_machine(set, o);
   set->add_option("param", o.param, "NODE.PARAM, or TYPE:PARAM for every node of that type")->required();
   CLI::Option* value = set->add_option("value", o.value, "with its unit");
   set->add_flag("--keep", o.keep, "also for later runs of the graph; without a running graph for these alone");
@@ -272,6 +291,7 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
     exit_code = understood([&] { return run_set(plugins, o); });
   });
   CLI::App* fault = add(app, "fault", "switches a fault of a simulated device on or off, or lists the faults", o);
+  for_a_machine(fault, o);
   fault->add_option("device", o.device, "device of the graph; left out: all are listed");
   CLI::Option* name = fault->add_option("fault", o.fault, "what goes wrong with it; left out: the device's are listed");
   CLI::Option* on = fault->add_option("on", o.on, "on or off")->check(CLI::IsMember({"on", "off"}));
@@ -284,16 +304,19 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
     exit_code = understood([&] { return run_fault(o); });
   });
   CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
+  for_a_machine(mode, o);
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();
   mode->footer("Example: takt mode safe_stop");
   mode->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "mode"}, {"mode", o.mode}}); }); });
   CLI::App* mark = add(app, "mark", "sets a mark in what a running graph records, and freezes its ring", o);
+  for_a_machine(mark, o);
   mark->add_option("words", o.words, "what happened")->required();
   mark->footer("Example: takt mark \"it turned left into the door\"");
   mark->callback([&] {
     exit_code = understood([&] { return run_question(o, {{"do", "mark"}, {"words", o.words}}); });
   });
   CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
+  for_a_machine(stop, o);
   stop->footer("Example: takt stop");
   stop->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "stop"}}); }); });
 }

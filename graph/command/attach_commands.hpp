@@ -15,6 +15,7 @@ namespace takt::command {
 struct AttachOptions {
   int run = 0;  ///< process id; 0: the only one that runs
   bool once = false, json = false;
+  std::string machine;  ///< of a graph on several; empty: the one that has what is asked about
   std::string port, param, value, mode, words;
   std::string device, fault, on;      ///< of fault; `on`: "on" or "off"
   bool keep = false, forget = false;  ///< of set

@@ -261,8 +261,8 @@ bool is_loopback(std::string_view address);
 /// A machine of a graph that may run on several.
 struct MachineSpec {
   std::string name, address;
-  std::vector<std::string> runs;        ///< subsystems and devices
-  std::map<std::string, int64_t> ages;  ///< of outputs that others read, when they are published, at most
+  std::vector<std::string> runs;            ///< subsystems and devices
+  std::map<std::string, int64_t> ages;      ///< of outputs that others read, when they are published, at most
   std::map<std::string, std::string> wire;  ///< of outputs that others read: zstd, lz4, jpeg
   Position position;
 };
@@ -272,6 +272,7 @@ struct NetworkSpec {
   int64_t latency_ns = 20'000'000;     ///< of a message, at most
   int64_t clock_error_ns = 1'000'000;  ///< that two machines may be unsure of each other's clock
   int domain = 0;                      ///< of DDS
+  bool trusted = false;                ///< whoever is on it may change the run
 };
 
 struct GraphSpec {
@@ -290,9 +291,10 @@ struct GraphSpec {
   WebSpec web;
   std::vector<MachineSpec> machines;
   NetworkSpec network;
-  std::string machine;               ///< the one that this is the part of; empty: it is the whole graph
-  std::vector<PortName> exported;    ///< outputs of this machine that others read
-  std::vector<ConditionSpec> asked;  ///< LoadOptions::conditions
+  std::string machine;                           ///< the one that this is the part of; empty: it is the whole graph
+  std::vector<PortName> exported;                ///< outputs of this machine that others read
+  std::map<std::string, std::string> elsewhere;  ///< nodes and devices that another machine runs, and which
+  std::vector<ConditionSpec> asked;              ///< LoadOptions::conditions
   ScheduleSpec schedule;
   KeptValues kept;
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report

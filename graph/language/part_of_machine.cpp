@@ -41,6 +41,10 @@ class Splitter {
     std::erase_if(graph_.record.freeze, [&](const ConditionSpec& condition) { return !has(condition.port); });
     std::erase_if(graph_.asked, [&](const ConditionSpec& condition) { return !has(condition.port); });
     graph_.machine = machine_;
+    for (const NodeSpec& node : whole_.nodes)
+      if (!here(node.id)) graph_.elsewhere[node.id] = home_.at(node.id);
+    for (const DeviceSpec& device : whole_.devices)
+      if (!here(device.id)) graph_.elsewhere[device.id] = home_.at(device.id);
     graph_.isolation = "subsystem";
   }
 

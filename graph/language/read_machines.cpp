@@ -58,6 +58,7 @@ void Loader::read_network() {
   time("clock_error", spec_.network.clock_error_ns);
   if (const json domain = network.value("domain", json()); domain.is_number_integer())
     spec_.network.domain = domain.get<int>();
+  if (const json trusted = network.value("trusted", json()); trusted.is_boolean()) spec_.network.trusted = trusted;
 }
 
 /// Each subsystem and device runs on one machine, and what releases a node on the same one.

@@ -44,7 +44,8 @@ struct Link::Import {
   Arrivals arrivals;
   std::vector<std::byte> decoded;  ///< the last message, if it came in a coding
   Histogram latency;               ///< from publication there to arrival here
-  std::atomic<uint64_t> received{0}, missing{0}, damaged{0}, late{0}, no_room{0}, unknown_clock{0};
+  std::atomic<uint64_t> received{0}, missing{0}, doubled{0}, passed{0}, damaged{0}, late{0}, no_room{0},
+      unknown_clock{0};
   std::atomic<int64_t> late_at_ns{INT64_MIN}, unknown_at_ns{INT64_MIN};  ///< the last one
 };
 
@@ -107,16 +108,22 @@ Link::Link(Options options, const std::vector<ImportName>& imports, std::vector<
       wire_(std::move(wire)) {
   for (const std::string& name : options_.peers) {
     peers_.push_back(std::make_unique<Peer>(name, options_.same));
-    wire_->takes({topic_name(options_.graph, name, "state"), true});
+    wire_->takes({topic_name(options_.graph, name, "state"), Wire::Promise::newest});
   }
+  for (const std::string& name : options_.peers)
+    wire_->takes({topic_name(options_.graph, name, "words"), Wire::Promise::all});
   for (const ImportName& import : imports) {
     imports_.push_back(std::make_unique<Import>(peer(import.machine), import));
     wire_->takes({topic_name(options_.graph, import.machine, import.port)});
   }
-  state_topic_ = wire_->sends({topic_name(options_.graph, options_.machine, "state"), true});
+  state_topic_ = wire_->sends({topic_name(options_.graph, options_.machine, "state"), Wire::Promise::newest});
+  words_topic_ = wire_->sends({topic_name(options_.graph, options_.machine, "words"), Wire::Promise::all});
   for (const Export& one : exports_)
     out_topics_.push_back(wire_->sends({topic_name(options_.graph, options_.machine, one.port)}));
   older_.resize(exports_.size());
+  questions_ =
+      std::make_unique<Questions>(Questions::Options{options_.machine, run_, options_.answer},
+                                  [this](std::span<const std::byte> words) { wire_->send(words_topic_, words); });
   wire_->begin([this](size_t topic, std::span<const std::byte> bytes) { take(topic, bytes); });
   sending_ = OwnThread([this](const std::stop_token& end) { send_on(end); });
 }
@@ -126,29 +133,75 @@ Link::~Link() {
   sending_.request_stop();
   bell_.ring();
   if (sending_.joinable()) sending_.join();
-  wire_.reset();  // nothing comes any more
+  const std::vector<std::string> lines = summary();
+  questions_->stop();  // it sends
+  wire_.reset();       // nothing comes any more
   if (!options_.say) return;
-  for (const std::string& line : summary()) options_.say(line);
+  for (const std::string& line : lines) options_.say(line);
+}
+
+Json Link::outputs_of(const Peer& machine) const {
+  Json outputs = Json::array();
+  for (const auto& import : imports_) {
+    if (&import->from != &machine) continue;
+    const auto ms = [&](int64_t ns) { return static_cast<double>(ns) / 1e6; };
+    outputs.push_back({{"port", import->port},
+                       {"received", import->received.load()},
+                       {"missing", import->missing.load()},
+                       {"late", import->late.load()},
+                       {"damaged", import->damaged.load()},
+                       {"doubled", import->doubled.load()},
+                       {"behind a newer one", import->passed.load()},
+                       {"without room", import->no_room.load()},
+                       {"of unknown age", import->unknown_clock.load()},
+                       {"latency_ms",
+                        {{"p50", ms(import->latency.quantile_ns(0.5))},
+                         {"p99", ms(import->latency.quantile_ns(0.99))},
+                         {"max", ms(import->latency.max_ns())}}}});
+  }
+  return outputs;
+}
+
+Json Link::report() const {
+  Json machines = Json::array();
+  const int64_t now_ns = clock_.now_ns();
+  const std::lock_guard lock(mutex_);
+  for (const auto& known : peers_) {
+    const int64_t heard_ns = known->heard_ns.load();
+    const char* const state = known->differs.load()            ? "runs something else"
+                              : heard_ns == INT64_MIN          ? "never heard"
+                              : now_ns - heard_ns > kSilent_ns ? "lost"
+                                                               : "here";
+    const auto clock = known->clock.offset(now_ns);
+    machines.push_back({{"name", known->name},
+                        {"state", state},
+                        {"clock_offset_ms", clock ? Json(static_cast<double>(clock->offset_ns) / 1e6) : Json()},
+                        {"clock_error_ms", clock ? Json(static_cast<double>(clock->error_ns) / 1e6) : Json()},
+                        {"clock_jumps", known->clock.jumps()},
+                        {"outputs", outputs_of(*known)},
+                        {"told", known->newest.told}});
+  }
+  return machines;
 }
 
 std::vector<std::string> Link::summary() const {
   std::vector<std::string> lines;
-  for (const auto& import : imports_) {
-    std::string what;
-    const auto add = [&](uint64_t count, const char* word) {
-      if (count > 0) what += fmt::format("{} {} {}", what.empty() ? ";" : ",", count, word);
-    };
-    add(import->missing.load(), "missing"), add(import->late.load(), "late"), add(import->damaged.load(), "damaged");
-    add(import->arrivals.doubles(), "doubled"), add(import->arrivals.passes(), "behind a newer one");
-    add(import->no_room.load(), "without room"), add(import->unknown_clock.load(), "of unknown age");
-    const auto ms = [&](double share) { return static_cast<double>(import->latency.quantile_ns(share)) / 1e6; };
-    lines.push_back(fmt::format("{} from machine {}: {} received within {:.2f} (p50), {:.2f} (p99), {:.2f} ms{}",
-                                import->port, import->from.name, import->received.load(), ms(0.5), ms(0.99),
-                                static_cast<double>(import->latency.max_ns()) / 1e6, what));
+  for (const Json& machine : report()) {
+    const std::string name = machine["name"];
+    for (const Json& output : machine["outputs"]) {
+      std::string what;
+      for (const char* word :
+           {"missing", "late", "damaged", "doubled", "behind a newer one", "without room", "of unknown age"})
+        if (const uint64_t count = output[word]; count > 0)
+          what += fmt::format("{} {} {}", what.empty() ? ";" : ",", count, word);
+      const Json& ms = output["latency_ms"];
+      lines.push_back(fmt::format("{} from machine {}: {} received within {:.2f} (p50), {:.2f} (p99), {:.2f} ms{}",
+                                  output["port"].get<std::string>(), name, output["received"].get<uint64_t>(),
+                                  ms["p50"].get<double>(), ms["p99"].get<double>(), ms["max"].get<double>(), what));
+    }
+    if (const uint64_t jumps = machine["clock_jumps"]; jumps > 0)
+      lines.push_back(fmt::format("the clock of machine {} jumped {} times", name, jumps));
   }
-  for (const auto& known : peers_)
-    if (known->clock.jumps() > 0)
-      lines.push_back(fmt::format("the clock of machine {} jumped {} times", known->name, known->clock.jumps()));
   for (size_t i = 0; i < exports_.size(); ++i)
     if (older_[i] > 0)
       lines.push_back(fmt::format("{}: {} messages were older than the {:.1f} ms that other machines count on",
@@ -221,7 +274,7 @@ void Link::send(size_t i, const Held& held, Framer& framer) {
 }
 
 void Link::send_state() {
-  State state{options_.machine, run_, options_.same, 0, {}, {}};
+  State state{options_.machine, run_, options_.same, 0, {}, {}, options_.tells ? options_.tells() : Json()};
   for (const Export& one : exports_)
     if (const auto capacity = one.capacity()) state.facts[one.port] = *capacity;
   {
@@ -237,7 +290,8 @@ void Link::send_state() {
 
 void Link::take(size_t topic, std::span<const std::byte> bytes) {
   if (topic < peers_.size()) take_state(bytes);
-  else take_message(*imports_[topic - peers_.size()], bytes);
+  else if (topic < 2 * peers_.size()) questions_->take(bytes);
+  else take_message(*imports_[topic - 2 * peers_.size()], bytes);
 }
 
 void Link::take_state(std::span<const std::byte> bytes) {
@@ -262,6 +316,8 @@ void Link::take_message(Import& import, std::span<const std::byte> bytes) {
   const auto verdict = import.arrivals.take(frame->sequence);
   import.received.store(import.arrivals.received());
   import.missing.store(import.arrivals.missing());
+  import.doubled.store(import.arrivals.doubles());
+  import.passed.store(import.arrivals.passes());
   if (verdict != Arrivals::fresh || import.from.differs.load()) return;
   const auto there = import.from.clock.offset(now_ns);
   if (!there || there->error_ns > options_.clock_error_ns) {

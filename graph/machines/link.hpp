@@ -12,6 +12,7 @@
 #include "graph/machines/arrivals.hpp"
 #include "graph/machines/frame.hpp"
 #include "graph/machines/peer.hpp"
+#include "graph/machines/questions.hpp"
 #include "graph/machines/wire.hpp"
 #include "hal/remote/remote_node.hpp"
 #include "rt/own_thread.hpp"
@@ -40,6 +41,8 @@ class Link {
     int64_t latency_ns = 0;                            ///< of the network, at most
     int64_t clock_error_ns = 0;                        ///< that two clocks may be unsure of each other
     std::function<void(const std::string&)> say = {};  ///< a line for people
+    std::function<Json()> tells = {};                  ///< what this machine says of its run, ten times a second
+    std::function<Json(const Json&)> answer = {};      ///< to questions of other machines; null: none is taken
   };
   /// An output of this machine that others read. `capacity`: nothing as long as its node is not set up.
   struct Export {
@@ -73,6 +76,11 @@ class Link {
   void begin(std::vector<Outgoing> outgoing);
   /// Setups that wait for another machine give up.
   void give_up();
+  /// The answer of another machine's run; see Questions. Any thread.
+  Json ask(const std::string& machine, const Json& question) { return questions_->ask(machine, question); }
+  /// What was seen of each other machine: [{name, state, clock_offset_ms, clock_error_ms, clock_jumps, outputs, told}].
+  /// For the report. Any thread.
+  Json report() const;
 
  private:
   struct Import;
@@ -80,6 +88,7 @@ class Link {
   /// A line for each output of others that came, and of this one's that were not as they should be, once the threads
   /// have ended.
   std::vector<std::string> summary() const;
+  Json outputs_of(const Peer& machine) const;
   void send(size_t export_index, const Held& held, Framer& framer);
   Peer& peer(std::string_view name);
   void send_on(const std::stop_token& end);
@@ -99,12 +108,13 @@ class Link {
   std::unique_ptr<Wire> wire_;
   std::vector<std::unique_ptr<Peer>> peers_;
   std::vector<std::unique_ptr<Import>> imports_;
-  std::mutex mutex_;  ///< states of peers; never taken in a job
+  std::unique_ptr<Questions> questions_;
+  mutable std::mutex mutex_;  ///< states of peers; never taken in a job
   std::condition_variable changed_;
   std::vector<Outgoing> outgoing_;
   std::vector<size_t> out_topics_;  ///< by export
   std::vector<uint64_t> older_;     ///< messages of it, of the sending thread: than others count on
-  size_t state_topic_ = 0;
+  size_t state_topic_ = 0, words_topic_ = 0;
   bool gave_up_ = false;
   std::atomic<bool> begun_{false};
   OwnThread sending_;

@@ -23,7 +23,7 @@ std::string text_of(const State& state) {
   for (const auto& [machine, of] : state.heard)
     heard[machine] = {{"run", of.run}, {"sent_ns", of.sent_ns}, {"received_ns", of.received_ns}};
   return Json{{"takt", kVersion},         {"machine", state.machine}, {"run", state.run}, {"graph", state.graph},
-              {"sent_ns", state.sent_ns}, {"facts", facts},           {"heard", heard}}
+              {"sent_ns", state.sent_ns}, {"facts", facts},           {"heard", heard},   {"told", state.told}}
       .dump();
 }
 
@@ -36,6 +36,7 @@ std::optional<State> state_of(std::string_view text) {
     state.run = json.at("run").get<uint64_t>();
     state.graph = json.at("graph").get<std::string>();
     state.sent_ns = json.at("sent_ns").get<int64_t>();
+    state.told = json.value("told", Json());
     for (const auto& [port, capacity] : json.at("facts").items()) state.facts[port] = capacity_of(capacity);
     for (const auto& [machine, of] : json.at("heard").items())
       state.heard[machine] = {of.at("run").get<uint64_t>(), of.at("sent_ns").get<int64_t>(),

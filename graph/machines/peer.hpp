@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 ///
 ///   {"takt": 1, "machine": "vision", "run": 81, "graph": "a1b2", "sent_ns": 5, "facts": {"stereo.disparity": [640,
 ///   480, 1, 0]},
-///    "heard": {"robot": {"run": 7, "sent_ns": 3, "received_ns": 4}}}
+///    "heard": {"robot": {"run": 7, "sent_ns": 3, "received_ns": 4}}, "told": {"mode": "full"}}
 struct State {
   std::string machine;
   uint64_t run = 0;   ///< another number after each start
@@ -31,6 +31,7 @@ struct State {
     int64_t sent_ns = 0, received_ns = 0;  ///< of the newest state of that machine: by its clock, by the sender's
   };
   std::map<std::string, Heard, std::less<>> heard;
+  Json told;  ///< of its run, for people: {"mode": "full", "misses": 0, "high_misses": 0}
 };
 
 std::string text_of(const State& state);

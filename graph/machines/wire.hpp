@@ -9,15 +9,20 @@
 
 namespace takt::machines {
 
-/// Carries bytes between machines by topic; what is sent may be lost unless the topic is reliable. Sending may take
+/// Carries bytes between machines by topic; what is sent may be lost unless the topic promises more. Sending may take
 /// tens of milliseconds: never in a job. Topics are made before begin() and the first message; send() on one thread at
-/// a time.
+/// a time for each.
 class Wire {
  public:
   virtual ~Wire() = default;
+  enum class Promise : uint8_t {
+    none,
+    newest,  ///< the newest message comes again until it has arrived, also to who joins late
+    all,     ///< each one comes again until it has arrived where somebody listens
+  };
   struct Topic {
     std::string name;
-    bool reliable = false;  ///< the newest message comes again until it has arrived, also to who joins late
+    Promise promise = Promise::none;
   };
   virtual size_t sends(const Topic& topic) = 0;  ///< its number for send()
   virtual size_t takes(const Topic& topic) = 0;  ///< its number for `each`

@@ -101,11 +101,11 @@ class IsolatedRun {
     plan_.overheads = machine.overheads;
     if (again()) forget_processes();
     for (size_t p = 0; p < partition_.names.size(); ++p) {
-      const auto body = [this, p, supervisor = getpid()](bool spare) -> int {
+      const auto body = [this, p, run, supervisor = getpid()](bool spare) -> int {
         machine::go_first_without_memory(is_high(p) ? kGoesLate : kGoesFirst);
         try {
-          return run_member({registry_, options_, graph_, partition_, plan_.overheads, p, spare, supervisor, board_,
-                             pools_, trace_.rings(), faults_, left_out_});
+          return run_member({registry_, options_, graph_, partition_, plan_.overheads, p, spare, supervisor, run,
+                             board_, pools_, trace_.rings(), faults_, left_out_, machines_});
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], machine::explain(problem)), kDeviceOrSystem);
         }
@@ -389,6 +389,7 @@ class IsolatedRun {
         make_report({registry_, graph_, plan_, board_, result, *transport_, use, options_.clock,
                      std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, proofs_, stalls_});
     report["left_out"] = left_out_.lines();
+    for (const std::string& line : machines_.lines()) report["machines"] = nlohmann::ordered_json::parse(line);
     report["memory"]["chunks_at_end"] = chunks_at_end_;
     report["rights"] = rights_;
     if (const size_t lost = group_.lost_nurseries(); lost > 0)
@@ -415,7 +416,7 @@ class IsolatedRun {
   RunFaults& faults_;
   RunExpectations expectations_;
   std::vector<std::string> adjusted_, problems_;
-  ToldLines left_out_;
+  ToldLines left_out_, machines_;
   graph::Proofs proofs_;
   StallLog stalls_;
   nlohmann::ordered_json rights_;

@@ -147,7 +147,7 @@ int run_member(const MemberPart& part) {
   how.quiet = part.spare;
   std::unique_ptr<machines::Link> link;  // its nodes go first, as all that this process has of them
   if (part.partition.names[part.process] == graph::kLinkProcess && !part.graph.machine.empty()) {
-    without_rights([&] { link = make_link(part.graph, registry, options.load.set, board, *prepared.clock); });
+    without_rights([&] { link = make_link(part.graph, registry, options.load.set, board, part.run, *prepared.clock); });
     if (part.graph.schedule.policy != Policy::cooperative) lift_other_threads();
     prepared.remote_source = [&link](const graph::DeviceSpec& device, const auto& ports) {
       return link->source(device.remote->machine, device.id, ports, graph::remote_law(*device.remote));
@@ -179,8 +179,13 @@ int run_member(const MemberPart& part) {
     record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   }
   const auto transport = part.faults.inject(std::move(joined), plan, *prepared.clock, board);
-  if (link) begin(*link, part.graph, plan, *transport);
-  const std::shared_ptr<void> before_transport(nullptr, [&link](void*) { link.reset(); });  // whose messages it reads
+  std::optional<Courier> courier;
+  if (link) begin(*link, part.graph, plan, *transport), courier.emplace(*link, part.run);
+  const std::shared_ptr<void> before_transport(nullptr, [&](void*) {  // whose messages it reads
+    courier.reset();
+    if (link) part.machines.tell({link->report().dump()});
+    link.reset();
+  });
   BoardGate gate(board, part.process, *prepared.clock);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);

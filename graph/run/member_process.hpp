@@ -43,11 +43,13 @@ struct MemberPart {
   size_t process = 0;                    ///< index into partition.names
   bool spare = false;                    ///< it takes the place of the process when that has died
   int supervisor = 0;                    ///< the process whose daemon it may have to join
+  int run = 0;                           ///< the process that stands for the run
   RunBoard& board;
   const PoolFile& pools;
   trace::Rings* rings = nullptr;  ///< null: not traced
   RunFaults& faults;
   ToldLines& left_out;
+  ToldLines& machines;  ///< what the link has seen of others, a line of JSON
 };
 
 /// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the

@@ -77,9 +77,48 @@ stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
 assert stop["completed"] >= stop["released"] - 1 >= 200, stop
 PY
 
+# One mode, one parameter, one stop for both, asked for on either; not where the graph does not say so.
+trusted=$source/graph/.trusted_$$.yaml
+trap 'rm -f "$source"/graph/.*_$$.yaml; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
+sed 's/domain: 93/domain: 93, trusted: true/' "$graph" >"$trusted"
+pair() { # pair GRAPH: both parts, until they run
+  on $one first robot 60 "$1"
+  first=$!
+  on $two second vision 60 "$1"
+  second=$!
+  for _ in $(seq 200); do
+    [ "$("$takt" top --run $first --once --json 2>/dev/null | grep -c '"running_s":[1-9]')" = 1 ] &&
+      "$takt" top --run $second --once >/dev/null 2>&1 && return
+    sleep 0.1
+  done
+  fail "the two parts do not run: $(cat "$work/first.err" "$work/second.err")"
+}
+pair "$trusted"
+tells 0 "traversability" "$takt" top --once --run $first --machine vision
+expect 0 "" "$takt" set --run $first traversability.step 8cm
+tells 0 "0.08" "$takt" get --run $second traversability.step
+tells 0 "0.08" "$takt" get --run $first traversability.step
+expect 2 "no machine \`arm\`; valid are: robot, vision" "$takt" mode --run $first --machine arm safe_stop
+expect 0 "" "$takt" mode --run $second safe_stop
+expect 0 "" "$takt" stop --run $second
+wait $first $second
+python3 - "$work" <<'PY' || fail "the two parts are no one run"
+import json, sys
+for part, other in (("first", "vision"), ("second", "robot")):
+    report = json.load(open(f"{sys.argv[1]}/{part}.json"))
+    assert report["modes"][-1]["name"] == "safe_stop", report["modes"]
+    machine, = report["machines"]
+    assert machine["name"] == other and machine["told"]["mode"] == "safe_stop", machine
+    assert all(output["received"] > 10 and output["missing"] == 0 for output in machine["outputs"]), machine
+PY
+pair "$graph"
+expect 3 "machine vision takes no words from others: say \`trusted: true\`" "$takt" mode --run $first safe_stop
+expect 0 "" "$takt" stop --run $first --machine robot
+expect 0 "" "$takt" stop --run $second --machine vision
+wait $first $second
+
 # Another graph is not listened to.
 sed 's/max_age: 200ms/max_age: 201ms/' "$graph" >"$source/graph/.other_$$.yaml"
-trap 'rm -f "$source/graph/.other_$$.yaml"; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
 on $one other robot 6 "$source/graph/.other_$$.yaml"
 other=$!
 on $two stranger vision 2 "$graph"

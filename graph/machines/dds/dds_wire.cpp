@@ -86,14 +86,10 @@ class DdsWire final : public Wire {
   template <class Make>
   dds_entity_t with_qos(const Topic& topic, const Make& make) const {
     dds_qos_t* const qos = dds_create_qos();
-    if (topic.reliable) {
-      dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_MSECS(10));
-      dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
-      dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
-    } else {
-      dds_qset_reliability(qos, DDS_RELIABILITY_BEST_EFFORT, 0);
-      dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kAtOnce);
-    }
+    const bool again = topic.promise != Promise::none;
+    dds_qset_reliability(qos, again ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(10));
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, topic.promise == Promise::newest ? 1 : kAtOnce);
+    if (topic.promise == Promise::newest) dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
     const dds_entity_t entity = make(qos);
     dds_delete_qos(qos);
     return entity;

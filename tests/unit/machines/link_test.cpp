@@ -88,12 +88,14 @@ struct Pair {
   Doorbell unrung;
   std::string same_here = "h", same_there = "h";
   std::vector<std::string> said;
+  std::function<Json()> tells;
+  std::function<Json(const Json&)> answer;
   std::unique_ptr<Link> vision, robot;
   std::unique_ptr<RemoteSource> source;
 
   void start_vision() {
     vision = std::make_unique<Link>(
-        Link::Options{"ace", "vision", same_there, {"robot"}, kLatency_ns, kClockError_ns, {}},
+        Link::Options{"ace", "vision", same_there, {"robot"}, kLatency_ns, kClockError_ns, {}, tells, answer},
         std::vector<Link::ImportName>{},
         std::vector<Link::Export>{{"map.grid", [this] { return set_up ? std::optional(kCapacity) : std::nullopt; }}},
         std::make_unique<test::MemoryWire>(network), publisher.bell, there);
@@ -170,6 +172,47 @@ TEST_CASE(
   pair.start_vision();  // its messages begin with 1 again, and those from before are sent once more
   CHECK(soon([&] { return pair.source->status(pair.here.now_ns()) == ReadStatus::ok; }));
   CHECK(soon([&] { return pair.source->counts().received > 8; }));
+}
+
+TEST_CASE("Questions are answered by the other machine, if it takes words from others; the report has what it tells") {
+  Pair pair;
+  pair.tells = [] { return Json{{"mode", "full"}}; };
+  pair.answer = [](const Json& question) { return Json{{"ok", true}, {"to", question}}; };
+  pair.start_vision(), pair.start_robot();
+  const Json question{{"do", "mode"}, {"mode", "safe_stop"}};
+  CHECK(pair.robot->ask("vision", question) == Json{{"ok", true}, {"to", question}});
+  const std::string refused = pair.vision->ask("robot", question)["error"];
+  CHECK(refused.find("machine robot takes no words from others") == 0);
+  CHECK(soon([&] { return pair.robot->report()[0]["told"] == Json{{"mode", "full"}}; }));
+  CHECK(soon([&] { return pair.robot->report()[0]["clock_offset_ms"].is_number(); }));
+  const Json vision = pair.robot->report()[0];
+  CHECK(vision["name"] == "vision");
+  CHECK(vision["state"] == "here");
+  CHECK(std::abs(vision["clock_offset_ms"].get<double>()) == doctest::Approx(7000).epsilon(0.01));
+  CHECK(vision["outputs"][0]["port"] == "map.grid");
+}
+
+TEST_CASE("Words that are none, or are for somebody else, are passed over") {
+  std::vector<std::string> sent;
+  std::mutex mutex;
+  Questions questions({"robot", 1, [](const Json&) { return Json{{"ok", true}}; }}, [&](std::span<const std::byte> bytes) {
+    const std::lock_guard lock(mutex);
+    sent.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  const auto come = [&](const std::string& text) { questions.take(std::as_bytes(std::span(text.data(), text.size()))); };
+  for (const char* text : {"", "{", "[]", "7", R"({"to": "arm", "from": "x", "id": 1, "question": {}})",
+                           R"({"to": "robot", "from": 3, "id": 1, "question": {}})", R"({"to": "robot", "from": "x"})",
+                           R"({"to": "robot", "from": "x", "id": -1, "question": {}})",
+                           R"({"to": "robot", "from": "x", "id": 9, "answer": {}})"})
+    come(text);
+  come(R"({"to": "robot", "from": "x", "id": 4, "question": {"do": "stop"}})");
+  CHECK(soon([&] {
+    const std::lock_guard lock(mutex);
+    return !sent.empty();
+  }));
+  questions.stop();
+  REQUIRE(sent.size() == 1);
+  CHECK(sent[0] == R"({"from":"robot","to":"x","id":4,"answer":{"ok":true}})");
 }
 
 TEST_CASE("A machine that runs another graph is named and not listened to; a setup that waits can be ended") {

@@ -93,7 +93,7 @@ TEST_CASE(
 }
 
 TEST_CASE("A state is read as it was written; what is none is told, not thrown") {
-  State state{"vision", 81, "a1b2", 5, {}, {}};
+  State state{"vision", 81, "a1b2", 5, {}, {}, {}};
   state.facts["stereo.disparity"] = {640, 480, 1, 0};
   state.heard["robot"] = {7, 3, 4};
   const auto again = state_of(text_of(state));
