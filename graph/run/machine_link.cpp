@@ -54,7 +54,7 @@ std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const R
                                   graph.network.latency_ns,
                                   graph.network.clock_error_ns,
                                   [](const std::string& line) { std::fprintf(stderr, "takt: %s\n", line.c_str()); }};
-  machines::WireOptions wire{"", graph.network.domain};
+  machines::WireOptions wire{"", graph.network.domain, graph.network.keys, options.say};
   for (const graph::MachineSpec& machine : graph.machines) {
     if (machine.name == graph.machine) wire.address = machine.address;
     else options.peers.push_back(machine.name);

@@ -3,41 +3,55 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "bytes.h"
 #include "graph/machines/dds/component.hpp"
+#include "graph/machines/dds/security.hpp"
+#include "graph/machines/dds/strangers.hpp"
 #include "rt/abi.hpp"
 
 namespace takt::machines {
 namespace {
 
 constexpr size_t kAtOnce = 32;
-constexpr int kSocketBuffer = 4 << 20;  ///< bytes; as much of it as net.core.rmem_max allows
 
 dds_entity_t made(dds_entity_t entity, const std::string& what) {
   if (entity < 0) throw std::runtime_error(fmt::format("DDS: no {}: {}", what, dds_strretcode(-entity)));
   return entity;
 }
 
-/// One named interface, by its address; multicast for finding each other alone.
+/// One named interface, by its address; multicast for finding each other alone. What is traced, Strangers reads.
 std::string configuration(const WireOptions& options) {
   return fmt::format(
       "<General><Interfaces><NetworkInterface address=\"{}\"/></Interfaces><AllowMulticast>spdp</AllowMulticast>"
       "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>1344B</FragmentSize></General>"
-      "<Internal><SocketReceiveBufferSize min=\"default\" max=\"{}B\"/></Internal>",
+      "<Internal><SocketReceiveBufferSize min=\"default\" max=\"{}B\"/></Internal>"
+      "<Tracing><Category>discovery</Category><OutputFile>/dev/null</OutputFile></Tracing>",
       options.address, kSocketBuffer);
+}
+
+dds_entity_t made_participant(const WireOptions& options) {
+  const auto domain = static_cast<dds_domainid_t>(options.domain);
+  if (options.keys.empty()) return made(dds_create_participant(domain, nullptr, nullptr), "participant");
+  const std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)> qos(dds_create_qos(), dds_delete_qos);
+  for (const auto& [name, value] : security_properties(options.keys))
+    dds_qset_prop(qos.get(), name.c_str(), value.c_str());
+  return made(
+      dds_create_participant(domain, qos.get(), nullptr),
+      fmt::format("participant with the keys in {}; what is wrong with them stands above", options.keys.string()));
 }
 
 class DdsWire final : public Wire {
  public:
   explicit DdsWire(const WireOptions& options)
-      : domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
+      : strangers_(!options.keys.empty(), options.say),
+        domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
                      fmt::format("domain on {}; is that address one of this machine?", options.address))),
-        participant_(
-            made(dds_create_participant(static_cast<dds_domainid_t>(options.domain), nullptr, nullptr), "participant")),
+        participant_(made_participant(options)),
         waitset_(made(dds_create_waitset(participant_), "waitset")) {}
   ~DdsWire() override { dds_delete(domain_); }  // with all in it
 
@@ -71,6 +85,7 @@ class DdsWire final : public Wire {
   void take(int64_t patience_ns, const std::function<void(size_t, std::span<const std::byte>)>& each) override {
     std::array<dds_attach_t, kAtOnce> ready{};
     const dds_return_t count = dds_waitset_wait(waitset_, ready.data(), ready.size(), patience_ns);
+    strangers_.look(readers_);
     if (count <= 0) return;
     for (size_t topic = 0; topic < readers_.size(); ++topic) take_all(topic, each);
   }
@@ -110,6 +125,7 @@ class DdsWire final : public Wire {
     }
   }
 
+  Strangers strangers_;  // hears what the domain says
   const dds_entity_t domain_, participant_, waitset_;
   std::vector<dds_entity_t> writers_, readers_;
 };
