@@ -6,7 +6,7 @@
     tests/tools/relay.py --self-test
 
 Bridges two interfaces, Ethernet frame by frame. Once both machines have sent --begin (20) messages it is bad for --for seconds: it
-drops --loss percent, delays by up to --jitter ms (which reorders), lets --reorder percent be overtaken by the next frame, doubles
+drops --loss percent, delays by up to --jitter ms (which reorders), holds --reorder percent back for --held ms (100), so that later ones overtake them, doubles
 --double percent, and lets nothing through from second A for B seconds (--partition A,B). Then it is a good cable until SIGTERM, and
 prints its account as JSON. --seed repeats its choices for the same frames.
 
@@ -176,7 +176,7 @@ class Badness:
             return []
         delays = [o.delay + self.chance.random() * o.jitter]
         if self.chance.random() * 100 < o.reorder:
-            delays[0] += 5
+            delays[0] += o.held
         if self.chance.random() * 100 < o.double:
             delays.append(delays[0] + self.chance.random() * max(o.jitter, 1))
         return delays
@@ -281,7 +281,7 @@ def self_test():
     parameters = struct.pack("<HHI", TOPIC_NAME, 4 + len(name), len(name)) + name + struct.pack("<HH", ENDPOINT_GUID, 16) + writer
     parameters += struct.pack("<HHI", RELIABILITY, 4, 2) + struct.pack("<HH", SENTINEL, 0)
     assert publication(b"\0\3\0\0" + parameters) == (writer, "takt/pair/one/state", True)
-    options = argparse.Namespace(seed=7, seconds=10, partition=(2, 3), loss=20, delay=0, jitter=50, reorder=0, double=10)
+    options = argparse.Namespace(seed=7, seconds=10, partition=(2, 3), loss=20, delay=0, jitter=50, reorder=0, held=100, double=10)
     badness = Badness(options)
     fates = [badness.of(1) for _ in range(10000)]
     assert 0.18 < sum(not fate for fate in fates) / 10000 < 0.22 and all(0 <= delay < 150 for fate in fates for delay in fate)
@@ -302,6 +302,7 @@ def main():
     parser.add_argument("left"), parser.add_argument("right")
     for name in ("loss", "delay", "jitter", "reorder", "double"):
         parser.add_argument("--" + name, type=float, default=0)
+    parser.add_argument("--held", type=float, default=100)
     parser.add_argument("--partition", type=lambda text: tuple(float(part) for part in text.split(",")))
     parser.add_argument("--for", type=float, default=20, dest="seconds")
     parser.add_argument("--begin", type=int, default=20)

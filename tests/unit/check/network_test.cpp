@@ -30,11 +30,11 @@ struct Kernel final : machine::Facts {
 };
 
 /// A machine with one output that two others read, 10 times a second, and one of another machine at 5 Hz.
-struct Part {
+struct OneOfThree {
   GraphSpec graph;
   Plan plan;
   Kernel kernel;
-  Part() {
+  OneOfThree() {
     graph.machine = "one";
     for (const char* name : {"one", "two", "three"}) graph.machines.push_back({name, "10.0.0.1", {}, {}, {}});
     graph.export_readers["maker.motion"] = {"two", "three"};
@@ -55,31 +55,31 @@ struct Part {
 
 TEST_CASE(
     "What goes over the network: each reader of an output, messages as they are packed; half the rate of what comes") {
-  const Part part;
-  const NetworkLoad load = network_load(part.graph, part.plan);
-  const double message_bits = 8.0 * static_cast<double>(part.plan.ports[0].message_bytes());
-  CHECK(load.largest_bytes == part.plan.ports[0].message_bytes());
+  const OneOfThree one;
+  const NetworkLoad load = network_load(one.graph, one.plan);
+  const double message_bits = 8.0 * static_cast<double>(one.plan.ports[0].message_bytes());
+  CHECK(load.largest_bytes == one.plan.ports[0].message_bytes());
   CHECK(load.in_bit_s > 5 * message_bits);
   CHECK(load.out_bit_s == doctest::Approx(4 * load.in_bit_s));  // two readers, twice the rate
 }
 
 TEST_CASE("More than the declared bandwidth is refused with what to do; without one nothing is proven") {
-  Part part;
-  auto found = check_network(part.graph, part.plan, part.kernel);
+  OneOfThree one;
+  auto found = check_network(one.graph, one.plan, one.kernel);
   REQUIRE(found);
   CHECK(found->problem.empty());
   REQUIRE(found->notes.size() == 1);
   CHECK(found->notes[0].find("`network` has no `bandwidth`") != std::string::npos);
-  part.graph.network.bandwidth = static_cast<int64_t>(found->load.out_bit_s) + 1;
-  CHECK(check_network(part.graph, part.plan, part.kernel)->problem.empty());
-  *part.graph.network.bandwidth -= 2;
-  const std::string problem = check_network(part.graph, part.plan, part.kernel)->problem;
+  one.graph.network.bandwidth = static_cast<int64_t>(found->load.out_bit_s) + 1;
+  CHECK(check_network(one.graph, one.plan, one.kernel)->problem.empty());
+  *one.graph.network.bandwidth -= 2;
+  const std::string problem = check_network(one.graph, one.plan, one.kernel)->problem;
   CHECK(problem.find("machine `one` sends up to") == 0);
-  const CheckResult result = check(part.graph, part.plan);
+  const CheckResult result = check(one.graph, one.plan);
   CHECK(!result.admitted);
   CHECK(result.text.find(problem.substr(0, 24)) != std::string::npos);
-  part.graph.machine.clear();
-  CHECK(!check_network(part.graph, part.plan, part.kernel));
+  one.graph.machine.clear();
+  CHECK(!check_network(one.graph, one.plan, one.kernel));
 }
 
 TEST_CASE("Small receive buffers are named with their cure") {
@@ -91,14 +91,14 @@ TEST_CASE("Small receive buffers are named with their cure") {
 }
 
 TEST_CASE("Addresses that others reach are named, unless there are keys") {
-  Part part;
-  CHECK(open_addresses(part.graph).empty());
-  part.graph.machines[1].address = "203.0.113.7";
-  const auto lines = open_addresses(part.graph);
+  OneOfThree one;
+  CHECK(open_addresses(one.graph).empty());
+  one.graph.machines[1].address = "203.0.113.7";
+  const auto lines = open_addresses(one.graph);
   REQUIRE(lines.size() == 1);
   CHECK(lines[0].find("machine `two` has the address 203.0.113.7") == 0);
-  part.graph.network.keys = "keys/one";
-  CHECK(open_addresses(part.graph).empty());
+  one.graph.network.keys = "keys/one";
+  CHECK(open_addresses(one.graph).empty());
 }
 
 TEST_CASE("Private are RFC 1918, link-local, ULA and loopback") {
