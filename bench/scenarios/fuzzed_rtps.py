@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Garbage at the DDS ports of a running part: fuzzed_rtps.py [SECONDS] [SEED].
+"""Garbage at the DDS ports of a running part: fuzzed_rtps.py [SECONDS] [SEED] [--keys].
 
 graph/two_machines.yaml in two network namespaces. Packets between the two parts are captured for a while; then for SECONDS (60)
 random and mutated ones are sent to the ports of the part `robot`, from the address of the other machine. Exit 1 if a process other
 than `link` ended, if `link` was away for more than 3 s, or if a job of a node was missed or left out. Where `link` was ended by the
-library, that is printed. Exit 77 without root or ip.
+library, that is printed. With --keys both parts have keys, and messages must go on as if nothing was there; without, a forged packet
+may cut a connection. Exit 77 without root or ip.
 """
 import ctypes
 import json
@@ -22,13 +23,16 @@ import time
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
-seconds = float((sys.argv[1:] or ["60"])[0])
-seed = int((sys.argv[2:] or ["1"])[0])
+with_keys = "--keys" in sys.argv
+arguments = [word for word in sys.argv[1:] if word != "--keys"]
+seconds = float((arguments[:1] or ["60"])[0])
+seed = int((arguments[1:] or ["1"])[0])
 MARK = os.getpid()
 SPACES = {name: f"fuzz-{name}-{MARK}" for name in ("robot", "vision")}
 ADDRESSES = {"robot": "10.93.0.1", "vision": "10.93.0.2"}
-CAPTURE_S, BATCH, PAUSE_S = 4, 10, 0.005  # 2,000 packets a second at most
+CAPTURE_S, BATCH, PAUSE_S = 6, 10, 0.005  # 2,000 packets a second at most
 BACK_S = 3
+RATE_HZ, KEPT = 15, 0.8  # of messages from the other machine; it ends a little earlier
 
 
 def ip(*words):
@@ -46,13 +50,14 @@ def lay_cable():
 
 
 def part(machine, work, run_s):
+    keys = ["--keys", work / "keys" / machine] if with_keys else []
     return subprocess.Popen(["ip", "netns", "exec", SPACES[machine], takt, "run", root / "graph/two_machines.yaml", "--machine", machine, "--for",
-                             f"{run_s}s", "--ring", "off", "--output", work / machine, "--report", work / f"{machine}.json"],
+                             f"{run_s}s", "--ring", "off", "--output", work / machine, "--report", work / f"{machine}.json", *keys],
                             stdout=subprocess.DEVNULL, stderr=open(work / f"{machine}.err", "w"))
 
 
 def capture():
-    """Payloads that went to the robot, by port."""
+    """Payloads that went to the robot, by port; those to all are taken for it as well."""
     cable = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))
     cable.bind(("cable", 0))
     cable.settimeout(0.1)
@@ -64,7 +69,7 @@ def capture():
             continue
         if frame[12:14] == b"\x08\x00" and frame[23] == 17 and frame[42:46] == b"RTPS":
             to = int.from_bytes(frame[36:38], "big")
-            if frame[30:34] == socket.inet_aton(ADDRESSES["robot"]):
+            if frame[26:30] == socket.inet_aton(ADDRESSES["vision"]):
                 ports.setdefault(to, []).append(frame[42:])
     return ports
 
@@ -143,19 +148,26 @@ def judge(report, away, said):
     nodes = [node for node in report["nodes"] if node["deadline_misses"] or (node["released"] or 0) > node["completed"] + 1]
     for node in nodes:
         print(f"  {node['name']}: {node['completed']} of {node['released']} jobs, {node['deadline_misses']} misses")
+    for device in report["devices"]:
+        if device["received"]:
+            print(f"  {device['name']}: {device['received']} received, {device['damaged']} damaged, {device['missing']} missing")
     print(f"  {len(ended)} processes ended, {len(strange)} of them not `link`, which was away {len(away)} times, {max(away, default=0):.2f} s at most; "
           f"{len(nodes)} nodes with a job missed")
     for line in subprocess.run(["dmesg"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False).stdout.splitlines()[-40:]:
         if "link[" in line:
             print("  kernel: " + line)
-    return bool(strange or nodes or max(away, default=0) > BACK_S) or "Sanitizer" in said
+    came = next(device["received"] for device in report["devices"] if device["name"] == "traversability")
+    cut = with_keys and came < KEPT * RATE_HZ * report["duration_s"]
+    return bool(strange or nodes or cut or max(away, default=0) > BACK_S) or "Sanitizer" in said
 
 
 def main(work):
     lay_cable()
     try:
+        if with_keys:
+            subprocess.run([takt, "keys", root / "graph/two_machines.yaml", "--out", work / "keys"], stdout=subprocess.DEVNULL, check=True)
         parts = [part(machine, work, seconds + 15) for machine in ADDRESSES]
-        time.sleep(3)
+        time.sleep(0.5)  # what they say first, too
         caught, done = {}, threading.Event()
         thread = threading.Thread(target=attack, args=(caught, done))
         thread.start()
