@@ -4,7 +4,7 @@
 
 graph/two_machines.yaml in two network namespaces. Packets between the two parts are captured for a while; then for SECONDS (60)
 random and mutated ones are sent to the ports of the part `robot`, from the address of the other machine. Exit 1 if a process other
-than `link` ended, if `link` was away for more than 3 s, or if a job of a node was missed or left out. Where `link` was ended by the
+than `link` ended, if `link` was away for more than 3 s, if a job was left out, or if one of high criticality was late. Where `link` was ended by the
 library, that is printed. With --keys both parts have keys, and messages must go on as if nothing was there; without, a forged packet
 may cut a connection. Exit 77 without root or ip.
 """
@@ -145,14 +145,16 @@ def judge(report, away, said):
     for fault in ended:
         print(f"  {fault['at_s']:.1f} s: {fault['what']}")
     strange = [fault for fault in ended if "process link" not in fault["what"]]
-    nodes = [node for node in report["nodes"] if node["deadline_misses"] or (node["released"] or 0) > node["completed"] + 1]
-    for node in nodes:
-        print(f"  {node['name']}: {node['completed']} of {node['released']} jobs, {node['deadline_misses']} misses")
+    nodes = [node for node in report["nodes"] if (node["released"] or 0) > node["completed"] + 1 or
+             (node["criticality"] == "high" and node["deadline_misses"])]
+    for node in report["nodes"]:
+        if node["deadline_misses"] or node in nodes:
+            print(f"  {node['name']} ({node['criticality']}): {node['completed']} of {node['released']} jobs, {node['deadline_misses']} late")
     for device in report["devices"]:
         if device["received"]:
             print(f"  {device['name']}: {device['received']} received, {device['damaged']} damaged, {device['missing']} missing")
     print(f"  {len(ended)} processes ended, {len(strange)} of them not `link`, which was away {len(away)} times, {max(away, default=0):.2f} s at most; "
-          f"{len(nodes)} nodes with a job missed")
+          f"{len(nodes)} nodes with a job left out, or of high criticality and late; host stall {report['host_stall_ms']} ms")
     for line in subprocess.run(["dmesg"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False).stdout.splitlines()[-40:]:
         if "link[" in line:
             print("  kernel: " + line)

@@ -5,7 +5,7 @@
     ip netns exec relay tests/tools/relay.py left right --loss 5 --jitter 50 --for 20 >account.json
     tests/tools/relay.py --self-test
 
-Bridges two interfaces, Ethernet frame by frame. Once both machines have sent --begin (20) messages it is bad for --for seconds: it
+Bridges two interfaces, Ethernet frame by frame. Once --talking (2) machines have sent --begin (20) messages it is bad for --for seconds: it
 drops --loss percent, delays by up to --jitter ms (which reorders), holds --reorder percent back for --held ms (100), so that later ones overtake them, doubles
 --double percent, and lets nothing through from second A for B seconds (--partition A,B). Then it is a good cable until SIGTERM, and
 prints its account as JSON. --seed repeats its choices for the same frames.
@@ -129,8 +129,8 @@ class Writer:
 
 
 class Account:
-    def __init__(self):
-        self.writers, self.topics = {}, {}
+    def __init__(self, talking=2):
+        self.writers, self.topics, self.talking = {}, {}, talking
 
     def sent(self, frame):
         for writer, number, first, count, whole, payload in self.pieces(frame):
@@ -149,9 +149,9 @@ class Account:
         return pieces(frame[at:]) if at else ()
 
     def settled(self, messages):
-        """Whether best-effort writers of two machines have sent so many."""
+        """Whether best-effort writers of each machine that sends have sent so many."""
         machines = {writer[:12] for writer, state in self.writers.items() if self.best_effort(writer) and len(state.taken) >= messages}
-        return len(machines) >= 2
+        return len(machines) >= self.talking
 
     def best_effort(self, writer):
         return writer in self.topics and not self.topics[writer][1]
@@ -197,7 +197,7 @@ def without_checksum(frame):
 
 class Relay:
     def __init__(self, options):
-        self.options, self.badness, self.account = options, Badness(options), Account()
+        self.options, self.badness, self.account = options, Badness(options), Account(options.talking)
         self.ends = [open_end(options.left), open_end(options.right)]
         self.waiting, self.order, self.begun = [], 0, None
         self.frames = self.dropped = 0
@@ -306,6 +306,7 @@ def main():
     parser.add_argument("--partition", type=lambda text: tuple(float(part) for part in text.split(",")))
     parser.add_argument("--for", type=float, default=20, dest="seconds")
     parser.add_argument("--begin", type=int, default=20)
+    parser.add_argument("--talking", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     relay = Relay(parser.parse_args())
     signal.signal(signal.SIGTERM, lambda *_: setattr(relay, "ended", True))
