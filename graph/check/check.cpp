@@ -239,6 +239,16 @@ void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& o
   }
 }
 
+/// More than the network carries is lost, whatever the jobs do.
+void add_network(const GraphSpec& graph, const Plan& plan, CheckResult& result) {
+  result.network = check_network(graph, plan, machine::SystemFacts());
+  if (!result.network) return;
+  result.notes.insert(result.notes.end(), result.network->notes.begin(), result.network->notes.end());
+  if (result.network->problem.empty()) return;
+  result.problems.push_back(result.network->problem);
+  if (result.answer == Answer::admitted) result.answer = Answer::not_proven;
+}
+
 /// Margins of each mode; a budget of the whole plan counts in the others as well.
 void add_margins(const GraphSpec& graph, const Plan& plan, const analysis::Overheads& overheads, CheckResult& result) {
   const auto all_hold = [&](const Plan& changed) {
@@ -317,6 +327,7 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
   admit_at_worst(graph, plan, options.machine, result);
   if (options.real_time && plan.policy != Policy::cooperative && !options.machine.not_preemptible.empty())
     result.notes.push_back(options.machine.not_preemptible);
+  add_network(graph, plan, result);
   result.admitted = result.answer == Answer::admitted && result.verdict != Verdict::invalid;
   if (result.admitted && options.margins) add_margins(graph, plan, result.charged, result);
   result.text = check_text(graph, plan, options, result);

@@ -7,6 +7,7 @@
 #include "graph/check/admission.hpp"
 #include "graph/check/ages.hpp"
 #include "graph/check/check_machine.hpp"
+#include "graph/check/network.hpp"
 #include "graph/language/graph.hpp"
 #include "hal/device_types.hpp"
 #include "hal/settings/json.hpp"
@@ -62,7 +63,8 @@ struct CheckResult {
   std::vector<std::string> problems;    ///< why it is not admitted: the task, the value, what would make it fit
   std::vector<PoolUse> pools;
   std::vector<CoreUse> core_use;
-  std::vector<ModeCheck> modes;  ///< that of the start first, then all others that the run can change to
+  std::optional<NetworkCheck> network = {};  ///< of the part of a machine
+  std::vector<ModeCheck> modes;              ///< that of the start first, then all others that the run can change to
   int64_t bandwidth_within_ns =
       0;             ///< after a process died: what its threads had of SCHED_DEADLINE is there again; 0: none
   std::string text;  ///< for people, the reason first if not admitted

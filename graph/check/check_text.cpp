@@ -48,6 +48,7 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
   for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   text += fmt::format("budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB\n", result.utilisation, result.cores,
                       result.cores == 1 ? "" : "s", static_cast<double>(result.pool_bytes) / 1e6);
+  if (result.network) text += network_text(*result.network, graph.network);
   if (!options.machine.overheads_from.empty()) {
     const analysis::Overheads& o = result.charged;
     text += fmt::format("{}{}\n  a job {:.0f} us + {:.1f} us per input or output, enforcement {:.2f} ms",
@@ -187,6 +188,7 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   json["analysis"] = whole.admission.by;
   json["problems"] = result.problems;
   json["notes"] = result.notes;
+  if (result.network) json["network"] = to_json(*result.network);
   if (!whole.change.empty()) json["change"] = whole.change;
   json["utilisation"] = result.utilisation;
   json["cores"] = result.cores;

@@ -7,6 +7,8 @@ namespace takt::command {
 
 struct DoctorOptions {
   bool measure = false, json = false, require_rt = false;
+  std::string peer;  ///< address of another machine that the way to is measured; empty: none
+  uint16_t port = 7390;
 };
 
 /// `takt doctor`: tries what Takt asks of the machine and tells what to change. 0 if it ran, whatever it found; with

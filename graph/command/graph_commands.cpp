@@ -131,6 +131,8 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
                 "shows the run in a browser and to Foxglove: `takt web` beside it, as the graph's `web` says");
   reads_file(run->add_option("--faults", o.faults,
                              "a scenario: injects its faults and exits 0 exactly if what it expects is met"));
+  reads_folder(run->add_option(
+      "--keys", o.keys, "keys of this machine (`takt keys`): only machines with keys of the same graph are heard"));
   writes_folder(run->add_option("--output", o.output, "folder for pictures and other results (default out)"));
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_option("--watchdog", o.watchdog,

@@ -12,6 +12,7 @@
 #include "graph/command/bringup_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/graph_commands.hpp"
+#include "graph/command/keys_command.hpp"
 #include "graph/command/log_commands.hpp"
 #include "graph/command/machine_command.hpp"
 #include "graph/command/new_command.hpp"
@@ -61,6 +62,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   NewOptions project;
   ServiceOptions service;
   MachineOptions machine;
+  KeysOptions keys;
   BringupOptions bringup;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
@@ -71,6 +73,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_new(app, project, exit_code);
   add_service_commands(app, service, exit_code);
   add_machine(app, machine, exit_code);
+  add_keys(app, plugins, keys, exit_code);
   add_bringup(app, plugins, bringup, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);

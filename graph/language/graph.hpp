@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -273,7 +274,12 @@ struct NetworkSpec {
   int64_t clock_error_ns = 1'000'000;  ///< that two machines may be unsure of each other's clock
   int domain = 0;                      ///< of DDS
   bool trusted = false;                ///< whoever is on it may change the run
+  std::optional<int64_t> bandwidth;    ///< bit/s that each machine can send and receive; nothing: not said
+  std::filesystem::path keys;          ///< not of the file: those of this machine (`--keys`); empty: it has none
 };
+/// Whether an address is one of networks that are not reached from elsewhere: RFC 1918, link-local, ULA (RFC 4193),
+/// loopback. What is no address is not.
+bool is_private(const std::string& address);
 
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
@@ -291,8 +297,9 @@ struct GraphSpec {
   WebSpec web;
   std::vector<MachineSpec> machines;
   NetworkSpec network;
-  std::string machine;                           ///< the one that this is the part of; empty: it is the whole graph
-  std::vector<PortName> exported;                ///< outputs of this machine that others read
+  std::string machine;             ///< the one that this is the part of; empty: it is the whole graph
+  std::vector<PortName> exported;  ///< outputs of this machine that others read
+  std::map<std::string, std::set<std::string>> export_readers;  ///< by such an output: the machines that read it
   std::map<std::string, std::string> elsewhere;  ///< nodes and devices that another machine runs, and which
   std::vector<ConditionSpec> asked;              ///< LoadOptions::conditions
   ScheduleSpec schedule;

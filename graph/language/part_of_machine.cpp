@@ -74,6 +74,7 @@ class Splitter {
       if (!here(to) && here(edge.from.node) &&
           std::find(graph_.exported.begin(), graph_.exported.end(), edge.from) == graph_.exported.end())
         graph_.exported.push_back(edge.from);
+      if (!here(to) && here(edge.from.node)) graph_.export_readers[edge.from.text()].insert(home_.at(to));
     });
   }
 

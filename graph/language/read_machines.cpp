@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which machine runs what (`machines`), and what lies between them (`network`).
+#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
 
 #include "graph/language/loader.hpp"
 #include "graph/language/part_of_machine.hpp"
@@ -11,6 +15,32 @@
 namespace takt::graph {
 
 using nlohmann::json;
+
+namespace {
+
+/// "1Gbit", "54.5 Mbit": bit/s. Nothing: another text, or none that is above 0.
+std::optional<int64_t> bandwidth_in(const std::string& text) {
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  const std::string_view unit = std::string_view(end).substr(std::string_view(end).find_first_not_of(' ') == 1 ? 1 : 0);
+  for (const auto& [name, factor] : {std::pair{"kbit", 1e3}, std::pair{"Mbit", 1e6}, std::pair{"Gbit", 1e9}})
+    if (unit == name && std::isfinite(number) && number * factor >= 1 && number * factor < 1e15)
+      return static_cast<int64_t>(number * factor);
+  return std::nullopt;
+}
+
+}  // namespace
+
+bool is_private(const std::string& address) {
+  if (in_addr four{}; inet_pton(AF_INET, address.c_str(), &four) == 1) {
+    const uint32_t number = ntohl(four.s_addr);
+    return number >> 24 == 10 || number >> 20 == (172 << 4 | 1) || number >> 16 == (192 << 8 | 168) ||
+           number >> 16 == (169 << 8 | 254) || number >> 24 == 127;
+  }
+  std::array<uint8_t, 16> six{};
+  if (inet_pton(AF_INET6, address.c_str(), six.data()) != 1) return false;
+  return (six[0] & 0xfe) == 0xfc || (six[0] == 0xfe && (six[1] & 0xc0) == 0x80) || is_loopback(address);
+}
 
 void Loader::read_machines() {
   read_network();
@@ -59,6 +89,14 @@ void Loader::read_network() {
   if (const json domain = network.value("domain", json()); domain.is_number_integer())
     spec_.network.domain = domain.get<int>();
   if (const json trusted = network.value("trusted", json()); trusted.is_boolean()) spec_.network.trusted = trusted;
+  if (const json bandwidth = network.value("bandwidth", json()); bandwidth.is_string()) {
+    spec_.network.bandwidth = bandwidth_in(bandwidth);
+    if (!spec_.network.bandwidth)
+      problem(graph_.value_at("/network/bandwidth"),
+              fmt::format("`bandwidth` of `network` is {}; write a number above 0 with kbit, Mbit or Gbit (a second), "
+                          "such as 100Mbit",
+                          ticked(bandwidth.get<std::string>())));
+  }
 }
 
 /// Each subsystem and device runs on one machine, and what releases a node on the same one.

@@ -36,4 +36,12 @@ std::optional<ClockPair::Offset> ClockPair::offset(int64_t now_ns) const {
   return Offset{best->offset.offset_ns, error_at(*best, now_ns)};
 }
 
+int64_t Stamps::here(int64_t there_ns, int64_t offset_ns) {
+  for (size_t i = 0; i < std::min(count_, known_.size()); ++i)
+    if (known_[i].there_ns == there_ns) return known_[i].here_ns;
+  const int64_t here_ns = there_ns - offset_ns;
+  known_[count_++ % known_.size()] = {there_ns, here_ns};
+  return here_ns;
+}
+
 }  // namespace takt::machines

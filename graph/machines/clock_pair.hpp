@@ -46,4 +46,22 @@ class ClockPair {
   uint64_t jumps_ = 0;
 };
 
+/// Stamps of another machine in this one's clock. What has one stamp there has one here, whatever was learnt of the
+/// clock between two messages: joins need that.
+///
+///   message.stamp_ns = stamps.here(frame.stamp_ns, offset.offset_ns);
+class Stamps {
+ public:
+  /// One thread at a time.
+  int64_t here(int64_t there_ns, int64_t offset_ns);
+  void forget() { count_ = 0; }
+
+ private:
+  struct Pair {
+    int64_t there_ns = 0, here_ns = 0;
+  };
+  std::array<Pair, 256> known_{};  ///< the newest ones
+  size_t count_ = 0;
+};
+
 }  // namespace takt::machines

@@ -311,7 +311,7 @@ void Link::take_message(Import& import, std::span<const std::byte> bytes) {
   const int64_t now_ns = clock_.now_ns();
   const auto frame = frame_of(bytes);
   if (!frame) return static_cast<void>(import.damaged.fetch_add(1));
-  if (frame->run != import.run) import.arrivals.begin_again();
+  if (frame->run != import.run) import.arrivals.begin_again(), import.from.stamps.forget();
   import.run = frame->run;
   const auto verdict = import.arrivals.take(frame->sequence);
   import.received.store(import.arrivals.received());
@@ -331,7 +331,7 @@ void Link::take_message(Import& import, std::span<const std::byte> bytes) {
     import.late.fetch_add(1);
     import.late_at_ns.store(now_ns);
   }
-  fill(import, frame->stamp_ns - there->offset_ns, std::max(visible_ns, now_ns), *frame);
+  fill(import, import.from.stamps.here(frame->stamp_ns, there->offset_ns), std::max(visible_ns, now_ns), *frame);
 }
 
 void Link::fill(Import& import, int64_t stamp_ns, int64_t visible_ns, const Frame& frame) {

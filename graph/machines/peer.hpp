@@ -49,6 +49,7 @@ class Peer {
   std::atomic<int64_t> heard_ns{INT64_MIN};  ///< when it was heard last
   std::atomic<bool> differs{false};          ///< it runs another graph, schedule or other parameters
   ClockPair clock;                           ///< of the hearing thread
+  Stamps stamps;                             ///< likewise
   State newest;                              ///< likewise
 
  private:

@@ -74,10 +74,11 @@ void Questions::answer_on(const std::stop_token& end) {
     asked_.pop_front();
     lock.unlock();
     const Json answer =
-        options_.answer ? options_.answer(asked.question)
-                        : wrong(fmt::format("machine {} takes no words from others: say `trusted: true` in `network` "
-                                            "if nobody else can reach it",
-                                            options_.machine));
+        options_.answer
+            ? options_.answer(asked.question)
+            : wrong(fmt::format("machine {} takes no words from others: give all of them keys (takt keys), or say "
+                                "`trusted: true` in `network` if nobody else can reach it",
+                                options_.machine));
     say({{"from", options_.machine}, {"to", asked.from}, {"id", asked.id}, {"answer", answer}});
   }
 }

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -33,9 +34,16 @@ class Wire {
   virtual void begin(Each each) = 0;
 };
 
+inline constexpr int kSocketBuffer = 4 << 20;  ///< bytes that are asked for; as much as net.core.rmem_max allows
+
 struct WireOptions {
   std::string address;  ///< of this machine's interface; nothing is sent or heard elsewhere
   int domain = 0;       ///< 0..230: wires of different domains do not hear each other
+  /// Folder of `takt keys` for this machine: only who has keys of the same authority is heard, and all is encrypted.
+  /// Empty: anybody is heard, and anybody hears.
+  std::filesystem::path keys = {};
+  /// A line for people: who is not listened to. From the thread that takes, and from the destructor. May be empty.
+  std::function<void(const std::string&)> say = {};
 };
 
 /// Over DDS (Cyclone). Throws std::runtime_error with the next step: it is not installed, or there is no such

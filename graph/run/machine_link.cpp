@@ -83,8 +83,9 @@ std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const R
                                   graph.network.clock_error_ns,
                                   [](const std::string& line) { std::fprintf(stderr, "takt: %s\n", line.c_str()); }};
   options.tells = [composed, &board] { return told_of(composed->plan, board); };
-  if (graph.network.trusted) options.answer = [run](const Json& question) { return answer_of(run, question); };
-  machines::WireOptions wire{"", graph.network.domain};
+  if (graph.network.trusted || !graph.network.keys.empty())
+    options.answer = [run](const Json& question) { return answer_of(run, question); };
+  machines::WireOptions wire{"", graph.network.domain, graph.network.keys, options.say};
   for (const graph::MachineSpec& machine : graph.machines) {
     if (machine.name == graph.machine) wire.address = machine.address;
     else options.peers.push_back(machine.name);

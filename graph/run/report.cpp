@@ -262,6 +262,7 @@ Json make_report(const RunFacts& facts) {
   report["duration_s"] = facts.result.duration_s();
   report["commit"] = version().commit;
   report["machine"] = machine_facts();
+  if (!facts.graph.machine.empty()) report["unauthenticated"] = facts.graph.network.keys.empty();
   report["ok"] = kept_its_promises(nodes) && !proofs.unexplained();
   report["modes"] = modes_json(facts);
   report["transport"] = facts.transport.name();

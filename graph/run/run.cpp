@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <optional>
 
 #include "graph/attach/server.hpp"
 #include "graph/check/doctor_text.hpp"
+#include "graph/check/network.hpp"
 #include "graph/cli/other_program.hpp"
+#include "graph/keys/machine_keys.hpp"
 #include "graph/run/expectations.hpp"
 #include "graph/run/faults.hpp"
 #include "graph/run/isolated_run.hpp"
@@ -194,6 +197,18 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   return execute(options, prepared, faults, expectations, *proofs, std::move(adjusted));
 }
 
+/// Of a machine among several: its keys, looked at before anything starts; without them others may listen and talk.
+int take_keys(const std::filesystem::path& folder, graph::GraphSpec& graph) {
+  graph.network.keys = folder;
+  for (const std::string& line : graph::open_addresses(graph))
+    std::fprintf(stderr, "takt: warning: %s\n", line.c_str());
+  if (folder.empty()) return kOk;
+  const keys::KeyCheck found = keys::check_keys(folder, graph, std::time(nullptr));
+  if (!found.problem.empty()) return refuse("--keys: " + found.problem, kBadInput);
+  if (!found.warning.empty()) std::fprintf(stderr, "takt: warning: %s\n", found.warning.c_str());
+  return kOk;
+}
+
 /// One process, or one per subsystem: as the command line says, else the graph.
 int run_as_asked(const Registry& registry, RunOptions options) {
   Prepared prepared(registry);
@@ -201,6 +216,7 @@ int run_as_asked(const Registry& registry, RunOptions options) {
     tell_problems(prepared.problems.size());
     return code;
   }
+  if (const int code = take_keys(options.keys, *prepared.graph); code != kOk) return code;
   if (options.load.state.empty()) tell_ignored_overlay(prepared.graph->name, "this run reads no kept values");
   options.keep_ring = keeps_ring(options, *prepared.graph);
   prepared.graph->record.recorded = options.keep_ring || !options.record.empty();

@@ -42,6 +42,7 @@ struct RunOptions {
   std::string durations = "budgets";  ///< of jobs in virtual time, see job_durations()
   std::string transport = "local";    ///< local | iceoryx
   std::filesystem::path report, html, junit, trace, record, output = "out";
+  std::filesystem::path keys;             ///< of this machine, see graph/keys; empty: it has none
   std::filesystem::path faults;           ///< scenario of faults that the run is given; empty: none
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none

@@ -112,7 +112,7 @@ for part, other in (("first", "vision"), ("second", "robot")):
     assert all(output["received"] > 10 and output["missing"] == 0 for output in machine["outputs"]), machine
 PY
 pair "$graph"
-expect 3 "machine vision takes no words from others: say \`trusted: true\`" "$takt" mode --run $first safe_stop
+expect 3 "machine vision takes no words from others" "$takt" mode --run $first safe_stop
 expect 0 "" "$takt" stop --run $first --machine robot
 expect 0 "" "$takt" stop --run $second --machine vision
 wait $first $second

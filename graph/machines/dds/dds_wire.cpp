@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -11,38 +12,52 @@
 
 #include "bytes.h"
 #include "graph/machines/dds/component.hpp"
+#include "graph/machines/dds/security.hpp"
+#include "graph/machines/dds/strangers.hpp"
 #include "rt/abi.hpp"
 
 namespace takt::machines {
 namespace {
 
 constexpr size_t kAtOnce = 32;
-constexpr int kSocketBuffer = 4 << 20;  ///< bytes; as much of it as net.core.rmem_max allows
 
 dds_entity_t made(dds_entity_t entity, const std::string& what) {
   if (entity < 0) throw std::runtime_error(fmt::format("DDS: no {}: {}", what, dds_strretcode(-entity)));
   return entity;
 }
 
-/// One named interface, by its address; multicast for finding each other alone.
+/// One named interface, by its address; multicast for finding each other alone. What is traced, Strangers reads.
 std::string configuration(const WireOptions& options) {
   return fmt::format(
       "<General><Interfaces><NetworkInterface address=\"{}\"/></Interfaces><AllowMulticast>spdp</AllowMulticast>"
       "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>1344B</FragmentSize></General>"
-      "<Internal><SocketReceiveBufferSize min=\"default\" max=\"{}B\"/></Internal>",
+      "<Internal><SocketReceiveBufferSize min=\"default\" max=\"{}B\"/></Internal>"
+      "<Tracing><Category>discovery</Category><OutputFile>/dev/null</OutputFile></Tracing>",
       options.address, kSocketBuffer);
+}
+
+dds_entity_t made_participant(const WireOptions& options) {
+  const auto domain = static_cast<dds_domainid_t>(options.domain);
+  if (options.keys.empty()) return made(dds_create_participant(domain, nullptr, nullptr), "participant");
+  const std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)> qos(dds_create_qos(), dds_delete_qos);
+  for (const auto& [name, value] : security_properties(options.keys))
+    dds_qset_prop(qos.get(), name.c_str(), value.c_str());
+  return made(
+      dds_create_participant(domain, qos.get(), nullptr),
+      fmt::format("participant with the keys in {}; what is wrong with them stands above", options.keys.string()));
 }
 
 class DdsWire final : public Wire {
  public:
   explicit DdsWire(const WireOptions& options)
-      : domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
+      : strangers_(!options.keys.empty(), options.say),
+        domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
                      fmt::format("domain on {}; is that address one of this machine?", options.address))),
-        participant_(made(dds_create_participant(static_cast<dds_domainid_t>(options.domain), nullptr, nullptr),
-                          "participant")) {}
+        participant_(made_participant(options)) {}
   ~DdsWire() override { dds_delete(domain_); }  // with all in it
 
   size_t sends(const Topic& topic) override {
+    if (topic.promise == Promise::newest) state_topic_ = writers_.size();
     writers_.push_back(made(with_qos(topic,
                                      [&](const dds_qos_t* qos) {
                                        return dds_create_writer(participant_, topic_of(topic, qos), qos, nullptr);
@@ -64,6 +79,7 @@ class DdsWire final : public Wire {
     takt_Bytes sample{};
     sample.data._buffer = const_cast<uint8_t*>(reinterpret_cast<const uint8_t*>(bytes.data()));
     sample.data._length = sample.data._maximum = static_cast<uint32_t>(bytes.size());
+    if (topic == state_topic_) strangers_.look(readers_);
     dds_write(writers_[topic], &sample);  // what could not be sent is missing there, and counted
   }
 
@@ -115,9 +131,11 @@ class DdsWire final : public Wire {
     }
   }
 
+  Strangers strangers_;  // hears what the domain says
   const dds_entity_t domain_, participant_;
   std::vector<dds_entity_t> writers_, readers_;
-  std::mutex taking_;  ///< several threads of DDS receive
+  size_t state_topic_ = SIZE_MAX;  ///< what is sent every now and then
+  std::mutex taking_;              ///< several threads of DDS receive
   Each each_;
 };
 

@@ -47,6 +47,18 @@ const DeviceSpec& device(const GraphSpec& graph, const std::string& id) {
 
 }  // namespace
 
+TEST_CASE("The bandwidth of the network is a number with its unit") {
+  const auto with_bandwidth = [](const std::string& text) {
+    return kGraph + with(kMachines, "domain: 7", "domain: 7, bandwidth: " + text);
+  };
+  CHECK(part("legs").network.bandwidth == std::nullopt);
+  CHECK(part("legs", with_bandwidth("1Gbit")).network.bandwidth == 1'000'000'000);
+  CHECK(part("legs", with_bandwidth("54.5 Mbit")).network.bandwidth == 54'500'000);
+  for (const char* none : {"fast", "0Mbit", "-1Gbit", "10MB", "1e300Gbit"})
+    wrong("domain: 7", std::string("domain: 7, bandwidth: ") + none, none, {"kbit, Mbit or Gbit"});
+  CHECK(part("eyes").export_readers.at("ego_motion.motion") == std::set<std::string>{"legs"});
+}
+
 TEST_CASE("Each machine has what it runs, and what it reads of others as devices at twice their rate") {
   const GraphSpec legs = part("legs");
   CHECK(legs.machine == "legs");

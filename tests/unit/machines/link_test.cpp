@@ -195,11 +195,17 @@ TEST_CASE("Questions are answered by the other machine, if it takes words from o
 TEST_CASE("Words that are none, or are for somebody else, are passed over") {
   std::vector<std::string> sent;
   std::mutex mutex;
-  Questions questions({"robot", 1, [](const Json&) { return Json{{"ok", true}}; }}, [&](std::span<const std::byte> bytes) {
-    const std::lock_guard lock(mutex);
-    sent.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  });
-  const auto come = [&](const std::string& text) { questions.take(std::as_bytes(std::span(text.data(), text.size()))); };
+  Questions questions({"robot", 1,
+                       [](const Json&) {
+                         return Json{{"ok", true}};
+                       }},
+                      [&](std::span<const std::byte> bytes) {
+                        const std::lock_guard lock(mutex);
+                        sent.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+                      });
+  const auto come = [&](const std::string& text) {
+    questions.take(std::as_bytes(std::span(text.data(), text.size())));
+  };
   for (const char* text : {"", "{", "[]", "7", R"({"to": "arm", "from": "x", "id": 1, "question": {}})",
                            R"({"to": "robot", "from": 3, "id": 1, "question": {}})", R"({"to": "robot", "from": "x"})",
                            R"({"to": "robot", "from": "x", "id": -1, "question": {}})",

@@ -92,6 +92,17 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("What has one stamp there has one here, whatever was learnt of the clock meanwhile") {
+  Stamps stamps;
+  const int64_t first = stamps.here(1'000, 100);
+  CHECK(first == 900);
+  CHECK(stamps.here(2'000, 103) == 1'897);
+  CHECK(stamps.here(1'000, 103) == first);
+  stamps.forget();
+  CHECK(stamps.here(1'000, 103) == 897);
+  for (int64_t i = 0; i < 1000; ++i) CHECK(stamps.here(10'000 + i, 0) == 10'000 + i);
+}
+
 TEST_CASE("A state is read as it was written; what is none is told, not thrown") {
   State state{"vision", 81, "a1b2", 5, {}, {}, {}};
   state.facts["stereo.disparity"] = {640, 480, 1, 0};
