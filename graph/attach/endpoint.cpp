@@ -41,6 +41,14 @@ std::vector<int> running() {
   return {};
 }
 
+tl::expected<int, std::string> chosen_run(int wanted) {
+  if (wanted > 0) return wanted;
+  const std::vector<int> runs = running();
+  if (runs.size() == 1) return runs.front();
+  return tl::unexpected(runs.empty() ? "no run is there; start one with `takt run GRAPH`"
+                                     : "there are several runs; say which one with --run PID");
+}
+
 Connection::Connection(int descriptor, int patience_ms) : descriptor_(descriptor) {
   const timeval patience{patience_ms / 1000, patience_ms % 1000 * 1000};
   setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <dds/dds.h>
-#include <fmt/format.h>
 
 #include <array>
 #include <stdexcept>
@@ -9,33 +8,22 @@
 
 #include "bytes.h"
 #include "graph/machines/dds/component.hpp"
+#include "hal/dds/interface.hpp"
 #include "rt/abi.hpp"
 
 namespace takt::machines {
 namespace {
 
+using dds::made;
+
 constexpr size_t kAtOnce = 32;
-constexpr int kSocketBuffer = 4 << 20;  ///< bytes; as much of it as net.core.rmem_max allows
-
-dds_entity_t made(dds_entity_t entity, const std::string& what) {
-  if (entity < 0) throw std::runtime_error(fmt::format("DDS: no {}: {}", what, dds_strretcode(-entity)));
-  return entity;
-}
-
-/// One named interface, by its address; multicast for finding each other alone.
-std::string configuration(const WireOptions& options) {
-  return fmt::format(
-      "<General><Interfaces><NetworkInterface address=\"{}\"/></Interfaces><AllowMulticast>spdp</AllowMulticast>"
-      "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>1344B</FragmentSize></General>"
-      "<Internal><SocketReceiveBufferSize min=\"default\" max=\"{}B\"/></Internal>",
-      options.address, kSocketBuffer);
-}
+constexpr const char* kLargeDatagrams =
+    "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>1344B</FragmentSize>";  ///< both ends are Cyclone
 
 class DdsWire final : public Wire {
  public:
   explicit DdsWire(const WireOptions& options)
-      : domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
-                     fmt::format("domain on {}; is that address one of this machine?", options.address))),
+      : domain_(dds::domain_on(options.address, options.domain, kLargeDatagrams, "")),
         participant_(
             made(dds_create_participant(static_cast<dds_domainid_t>(options.domain), nullptr, nullptr), "participant")),
         waitset_(made(dds_create_waitset(participant_), "waitset")) {}
