@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "graph/language/words.hpp"
 #include "graph/log/followed_port.hpp"
@@ -34,6 +35,18 @@ std::string first_odometry(const Json& ports) {
   return found == ports.end() ? "" : found->value("name", "");
 }
 
+/// All that messages of an output can show: a picture may also be rectified, which its zeros do not say.
+std::vector<world::Outline> outlines_of(const log::FollowedPort& port) {
+  if (port.type == nullptr) return {};
+  const AlignedBytes message = world::specimen(*port.type, port.capacity);
+  for (const Field& field : port.type->fields)
+    if (field.name == "camera.focal_px") {
+      constexpr double kAny = 1;
+      std::memcpy(message.get() + field.offset, &kAny, sizeof kAny);
+    }
+  return world::RosEncoder().outline(*port.type, message.get());
+}
+
 }  // namespace
 
 tl::expected<Offer, std::string> offer_of(const Json& graph, const graph::MessageTypes& types,
@@ -46,7 +59,6 @@ tl::expected<Offer, std::string> offer_of(const Json& graph, const graph::Messag
   if (const auto why = problem(ports, options.map_pose, Pose::type_name, "--map-pose"); !why.empty())
     return tl::unexpected(why);
 
-  const world::RosEncoder encoder;
   Offer offer;
   offer.odometry = options.odometry.empty() ? first_odometry(ports) : options.odometry;
   for (const Json& described : ports) {
@@ -54,8 +66,7 @@ tl::expected<Offer, std::string> offer_of(const Json& graph, const graph::Messag
     if (!options.ports.empty() && std::find(options.ports.begin(), options.ports.end(), name) == options.ports.end())
       continue;
     const log::FollowedPort port(described, types);
-    std::vector<world::Outline> outlines;
-    if (port.type != nullptr) outlines = encoder.outline(*port.type, world::specimen(*port.type, port.capacity).get());
+    std::vector<world::Outline> outlines = outlines_of(port);
     if (is_type(described, Odometry::type_name) && name != offer.odometry)
       std::erase_if(outlines, [](const world::Outline& outline) { return outline.topic == "/tf"; });
     if (outlines.empty()) offer.left_out.push_back(name);

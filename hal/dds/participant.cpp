@@ -42,12 +42,13 @@ Guid guid_of_entity(dds_entity_t entity) {
   return bytes;
 }
 
-/// Loopback has no multicast that one could count on: others of this machine are asked one by one.
+/// Loopback has no multicast that one could count on: others of this machine are asked one by one, and often, since
+/// those that begin later cannot be heard.
 std::string finding_others(const std::string& address) {
   if (!address.starts_with("127.")) return "";
   return fmt::format(
-      "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>"
-      "<Peers><Peer address=\"{}\"/></Peers></Discovery>",
+      "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>20</MaxAutoParticipantIndex>"
+      "<SPDPInterval>1s</SPDPInterval><Peers><Peer address=\"{}\"/></Peers></Discovery>",
       address);
 }
 

@@ -67,7 +67,7 @@ for output in front_laser.scan base.odometry; do echoes $output "$work/$output" 
 types=sensor_msgs::msg::dds_
 listen 6 "rt/takt/front_laser/scan=$types::LaserScan_" "rt/takt/base/odometry=nav_msgs::msg::dds_::Odometry_:r" \
   "rt/takt/head_camera/pair/left/image_raw/compressed=$types::CompressedImage_" \
-  "rt/takt/traversability/traversability=nav_msgs::msg::dds_::OccupancyGrid_:t" "rt/tf=tf2_msgs::msg::dds_::TFMessage_:r" \
+  "rt/takt/mapping_3d/obstacles=nav_msgs::msg::dds_::OccupancyGrid_:t" "rt/tf=tf2_msgs::msg::dds_::TFMessage_:r" \
   "rt/tf_static=tf2_msgs::msg::dds_::TFMessage_:t" "rt/diagnostics=diagnostic_msgs::msg::dds_::DiagnosticArray_:r" \
   "ros_discovery_info=rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_:t" >"$work/heard" || fail "the reader"
 wait $echoing

@@ -56,7 +56,7 @@ for odometry in same_as("base.odometry", "rt/takt/base/odometry", same_place):
 
 for image in messages("rt/takt/head_camera/pair/left/image_raw/compressed", 30):
     assert image["format"] == "jpeg" and image["data"]["size"] > 1000 and image["data"]["some"][0] == 0xFF, image
-for grid in messages("rt/takt/traversability/traversability", 5):
+for grid in messages("rt/takt/mapping_3d/obstacles", 3):
     assert len(grid["cells"]) == grid["width"] * grid["height"] > 0 and set(grid["cells"]) <= set(range(-1, 101)), grid["width"]
 transforms = {(t["header"]["frame"], t["child"]) for m in messages("rt/tf", 30) for t in m["transforms"]}
 assert ("odom", "base_link") in transforms and ("robot", "front_laser") in transforms, transforms
