@@ -76,7 +76,8 @@ int publish(const Options& options, const graph::MessageTypes& types) {
     Publisher publisher(participant, types, options.publisher);
     fmt::print("takt ros2: node {}/takt on {}, domain {}\n", options.publisher.name_space, options.network.address,
                options.network.domain);
-    std::fflush(stdout);
+    if (std::fflush(stdout) != 0)
+      return refuse("stdout does not take what is published where\n  fix: room for it", kDeviceOrSystem);
     publisher.run(ending);
     const Publisher::Counts& counts = publisher.counts();
     fmt::print("written: {}, not sent to slow readers: {}, damaged: {}, steps of the wall clock: {}\n", counts.written,

@@ -13,10 +13,10 @@ constexpr int64_t kSecond_ns = 1'000'000'000;
 
 /// Every beam lies within a quarter of a step of where the rule has it.
 bool same_angles(const ScanRule& rule, double first_rad, double step_rad) {
-  const double last = first_rad + step_rad * (rule.beams - 1),
-               expected = rule.first_angle_rad + rule.step_rad * (rule.beams - 1);
-  const double off = std::max(std::abs(first_rad - rule.first_angle_rad), std::abs(last - expected));
-  return off <= rule.step_rad / 4;  // false for what is not a number
+  const auto is_near = [&](double angle, double expected) { return std::abs(angle - expected) <= rule.step_rad / 4; };
+  const double beams = rule.beams - 1;
+  return is_near(first_rad, rule.first_angle_rad) &&
+         is_near(first_rad + step_rad * beams, rule.first_angle_rad + rule.step_rad * beams);
 }
 
 }  // namespace

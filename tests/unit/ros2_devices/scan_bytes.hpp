@@ -15,7 +15,7 @@ struct ScanBytes {
   uint32_t nanoseconds = 34;
   std::string frame = "laser";
   float first_rad = -0.5f, step_rad = 0.5f;
-  std::vector<float> ranges{1, 2, 3}, intensities;
+  std::vector<float> ranges{1, 2, 3}, intensities{};
 
   std::vector<std::byte> bytes(bool big_endian = false) const {
     std::vector<std::byte> all{std::byte{0}, std::byte{static_cast<unsigned char>(big_endian ? 0 : 1)}, {}, {}};
