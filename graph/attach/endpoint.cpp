@@ -79,10 +79,16 @@ std::optional<nlohmann::ordered_json> Connection::read_line() {
 }
 
 std::optional<std::string> Connection::read_bytes(size_t count) {
-  while (rest_.size() < count)
-    if (!fill()) return std::nullopt;
+  constexpr size_t kAtOnce = 1 << 20;  // no more room than bytes come for
   std::string bytes = rest_.substr(0, count);
   rest_.erase(0, count);
+  for (size_t have = bytes.size(); have < count;) {
+    bytes.resize(std::min(count, have + kAtOnce));
+    const ssize_t got = recv(descriptor_, bytes.data() + have, bytes.size() - have, MSG_WAITALL);
+    if (got <= 0) return std::nullopt;
+    have += static_cast<size_t>(got);
+    bytes.resize(have);
+  }
   return bytes;
 }
 

@@ -93,4 +93,25 @@ start_run again --for 0s
 said "follows ace" "$work/ros2.err" 2
 kill -INT $ros2; wait $ros2
 end_run 0 1
+
+echo "=== driver ros2: the scans of one run in another, over loopback"
+heard=$source/graph/.ros2_$$.yaml
+trap 'kill $run $ros2 2>/dev/null; rm -f "$heard"; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
+sed 's#^  sim: .*#  sim: {default: {driver: sim, world: worlds/lab.xml}, front_laser: {driver: ros2, domain: '$domain', topic: /takt/front_laser/scan, beams: 181, fov: 180deg, range: 8m, latency: 100ms}}#' \
+  "$source/graph/lasers.yaml" >"$heard"
+start_run makes "$source/graph/lasers.yaml" --for 0s
+ip netns exec $one "$takt" ros2 --domain $domain --run $run >/dev/null 2>"$work/ros2.err" &
+ros2=$!
+said "follows lasers" "$work/ros2.err"
+expect 0 "" ip netns exec $one "$takt" run "$heard" --policy cooperative --for 8s --ring off --output "$work/hears" --report "$work/hears.json"
+python3 - "$work/hears.json" <<'PY' || fail "what driver ros2 heard"
+import json, sys
+report = json.load(open(sys.argv[1]))
+device = next(d for d in report["devices"] if d["name"] == "front_laser")
+assert device["state"] == "ok" and device["received"] >= 60 and device["damaged"] == 0, device
+stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
+assert stop["completed"] > 60, stop
+PY
+kill -INT $ros2; wait $ros2
+end_run 0 1
 finish
