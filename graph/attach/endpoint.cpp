@@ -41,6 +41,14 @@ std::vector<int> running() {
   return {};
 }
 
+tl::expected<int, std::string> chosen_run(int wanted) {
+  if (wanted > 0) return wanted;
+  const std::vector<int> runs = running();
+  if (runs.size() == 1) return runs.front();
+  return tl::unexpected(runs.empty() ? "no run is there; start one with `takt run GRAPH`"
+                                     : "there are several runs; say which one with --run PID");
+}
+
 Connection::Connection(int descriptor, int patience_ms) : descriptor_(descriptor) {
   const timeval patience{patience_ms / 1000, patience_ms % 1000 * 1000};
   setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
@@ -71,10 +79,16 @@ std::optional<nlohmann::ordered_json> Connection::read_line() {
 }
 
 std::optional<std::string> Connection::read_bytes(size_t count) {
-  while (rest_.size() < count)
-    if (!fill()) return std::nullopt;
+  constexpr size_t kAtOnce = 1 << 20;  // no more room than bytes come for
   std::string bytes = rest_.substr(0, count);
   rest_.erase(0, count);
+  for (size_t have = bytes.size(); have < count;) {
+    bytes.resize(std::min(count, have + kAtOnce));
+    const ssize_t got = recv(descriptor_, bytes.data() + have, bytes.size() - have, MSG_WAITALL);
+    if (got <= 0) return std::nullopt;
+    have += static_cast<size_t>(got);
+    bytes.resize(have);
+  }
   return bytes;
 }
 

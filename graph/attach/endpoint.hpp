@@ -4,6 +4,7 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <tl/expected.hpp>
 #include <vector>
 
 #include "graph/attach/socket_folder.hpp"
@@ -14,6 +15,9 @@ namespace takt::attach {
 /// Process ids of the runs that can be spoken to: of this user; if there are none, of the service (see SocketFolder).
 /// Replays are not among them, as long as there is a run.
 std::vector<int> running();
+
+/// The one that an observer follows: `wanted`, or the one that there is. Error: there is none, or several.
+tl::expected<int, std::string> chosen_run(int wanted);
 
 /// One connection, of either side. Reads and writes block, at most `patience_ms` each.
 class Connection {

@@ -13,7 +13,7 @@
 #include "graph/check/network.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/machines/way.hpp"
-#include "graph/machines/wire.hpp"
+#include "hal/dds/socket_buffer.hpp"
 #include "rt/machine/checks.hpp"
 #include "rt/machine/measure.hpp"
 #include "rt/machine/parse.hpp"
@@ -44,7 +44,7 @@ std::string buffers_text() {
   const auto of = [&](const char* name) {
     return machine::trimmed(facts.text(std::string("/proc/sys/net/core/") + name).value_or("not known"));
   };
-  const std::string cure = graph::small_buffers(machines::kSocketBuffer / graph::kBufferedMessages, facts);
+  const std::string cure = graph::small_buffers(dds::kSocketBuffer / graph::kBufferedMessages, facts);
   return fmt::format("  receive buffers: {} bytes at most (net.core.rmem_max), {} without asking (rmem_default)\n{}",
                      of("rmem_max"), of("rmem_default"), cure.empty() ? "" : fmt::format("  fix, shell: {}\n", cure));
 }

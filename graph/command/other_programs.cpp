@@ -22,6 +22,7 @@ constexpr DeskCommand kDeskCommands[] = {
     {"eval", "measures quality against ground truth", "takt-eval"},
     {"image", "builds, tries, writes and updates machines that boot into a graph", "takt"},
     {"objects", "the database of known objects: what is in it, learning, tuning", "takt-tools"},
+    {"ros2", "publishes a running graph to ROS 2", "takt-ros2"},
     {"terrain", "kinds of terrain that ground_map tells apart", "takt-tools"},
     {"train", "learns what nodes look for", "takt-tools"},
     {"web", "shows a running graph in a browser and to Foxglove", "takt-web"},

@@ -34,8 +34,6 @@ class Wire {
   virtual void begin(Each each) = 0;
 };
 
-inline constexpr int kSocketBuffer = 4 << 20;  ///< bytes that are asked for; as much as net.core.rmem_max allows
-
 struct WireOptions {
   std::string address;  ///< of this machine's interface; nothing is sent or heard elsewhere
   int domain = 0;       ///< 0..230: wires of different domains do not hear each other

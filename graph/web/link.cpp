@@ -11,9 +11,8 @@
 
 #include "graph/attach/message_text.hpp"
 #include "graph/web/page_frames.hpp"
-#include "graph/web/specimen.hpp"
 #include "graph/world/encoder.hpp"
-#include "rt/record/packed_message.hpp"
+#include "graph/world/specimen.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::web {
@@ -57,11 +56,10 @@ void Link::work() {
   pthread_setname_np(pthread_self(), "takt-link");
   for (std::string why = "no run is there; start one with `takt run GRAPH`"; !ending_.load();) {
     std::this_thread::sleep_for(kRetry);
-    const std::vector<int> runs = attach::running();
-    const int run = options_.run > 0 ? options_.run : runs.size() == 1 ? runs.front() : 0;
-    if (runs.size() > 1 && options_.run == 0) why = "there are several runs; say which one with --run PID";
-    auto connection = run > 0 ? attach::connect_to(run) : std::nullopt;
-    run_.store(connection ? run : 0);
+    const auto run = attach::chosen_run(options_.run);
+    if (!run && !attach::running().empty()) why = run.error();
+    auto connection = run ? attach::connect_to(*run) : std::nullopt;
+    run_.store(connection ? *run : 0);
     if (connection) why = follow(*connection);
     if (connection || hub_.why_gone() != why) hub_.set_graph(nullptr, {}, why);
   }
@@ -88,7 +86,7 @@ bool Link::describe(attach::Connection& connection) {
   ports_.clear();
   std::vector<Channel> channels;
   for (Json& port : (*graph)["ports"]) {
-    Port made = port_of(port);
+    Port made(port, types_);
     Json shows = made.type != nullptr ? Json(kinds_of(*made.type, made.capacity)) : Json::array();
     shows.push_back("value");
     port["shows"] = std::move(shows);
@@ -101,25 +99,10 @@ bool Link::describe(attach::Connection& connection) {
   return true;
 }
 
-Link::Port Link::port_of(const Json& port) const {
-  Port made;
-  auto recorded = log::RecordedType::read(
-      {.name = "takt." + port.value("type", ""), .encoding = {}, .data = port.value("layout", Json()).dump()});
-  if (!recorded) return made;
-  made.recorded.emplace(std::move(*recorded));
-  const Json& size = port.at("capacity");
-  made.capacity = {size.at(0), size.at(1), size.at(2), size.at(3)};
-  const auto known = types_.find(made.recorded->name());
-  if (known == types_.end() || !made.recorded->is(*known->second)) return made;
-  made.type = known->second;
-  made.memory = aligned_bytes(made.type->bytes(made.capacity));
-  return made;
-}
-
 std::vector<Channel> Link::channels_of(const std::string& name, const Port& port) const {
   std::vector<Channel> channels;
   if (port.type != nullptr && port.type->show != nullptr) {
-    const AlignedBytes message = specimen(*port.type, port.capacity);
+    const AlignedBytes message = world::specimen(*port.type, port.capacity);
     for (const world::Outline& outline : encoder_.outline(*port.type, message.get()))
       channels.push_back({{name},
                           world::topic_of(name, outline.topic),
@@ -162,14 +145,11 @@ bool Link::take(attach::Connection& connection, const Json& line) {
 }
 
 void Link::show(const std::string& name, Port& port, const Json& line, const std::string& packed) {
-  bool filled = false;
+  std::optional<bool> filled;
   const std::span bytes(reinterpret_cast<const std::byte*>(packed.data()), packed.size());
   const auto fill = [&] {
-    if (filled) return true;
-    if (port.type == nullptr) return false;
-    port.type->place(port.memory.get(), port.capacity);
-    filled = record::unpack(*port.type, bytes, port.memory.get()) && port.type->sound(port.memory.get());
-    return filled;
+    if (!filled) filled = port.fill(bytes);
+    return *filled;
   };
   const int64_t stamp_ns = line.value("stamp_ns", int64_t{0});
   const Origin origin{name,

@@ -10,10 +10,9 @@
 #include "graph/attach/endpoint.hpp"
 #include "graph/attach/machine_use.hpp"
 #include "graph/language/message_types.hpp"
-#include "graph/log/recorded_type.hpp"
+#include "graph/log/followed_port.hpp"
 #include "graph/web/hub.hpp"
 #include "graph/world/encoder.hpp"
-#include "rt/memory/aligned_bytes.hpp"
 #include "rt/own_thread.hpp"
 
 namespace takt::web {
@@ -35,18 +34,14 @@ class Link {
   Json ask(const Json& question) const;
 
  private:
-  struct Port {
-    std::optional<log::RecordedType> recorded;
-    const MessageType* type = nullptr;  ///< null: by its fields alone
-    Capacity capacity;
-    AlignedBytes memory;
+  struct Port : log::FollowedPort {
+    using log::FollowedPort::FollowedPort;
     double asked_hz = -1;  ///< what the run was asked for; negative: nothing
   };
   void work();
   /// The end of a run, in words.
   std::string follow(attach::Connection& connection);
   bool describe(attach::Connection& connection);
-  Port port_of(const Json& port) const;
   std::vector<Channel> channels_of(const std::string& name, const Port& port) const;
   bool tell_wishes(attach::Connection& connection);
   bool take(attach::Connection& connection, const Json& line);

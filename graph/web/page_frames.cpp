@@ -5,7 +5,7 @@
 #include <cstring>
 #include <span>
 
-#include "graph/web/specimen.hpp"
+#include "graph/world/specimen.hpp"
 #include "rt/msg/viewer.hpp"
 #include "rt/record/jpeg_compressor.hpp"
 
@@ -131,7 +131,7 @@ std::vector<std::string> kinds_of(const MessageType& type, const Capacity& capac
   if (type.show == nullptr) return {};
   const Origin nowhere;
   PageViewer viewer("", nowhere);
-  type.show(specimen(type, capacity).get(), viewer);
+  type.show(world::specimen(type, capacity).get(), viewer);
   return viewer.kinds;
 }
 

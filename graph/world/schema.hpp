@@ -9,8 +9,8 @@
 //   definition<Quaternion>();        // "float64 x\nfloat64 y\n..."
 //   encoded(Quaternion{});           // its CDR
 //
-// A member is a number, a text (std::string_view), another schema, a std::array of numbers or a std::span of any of
-// these: a sequence. A packed sequence (see Packed) is written by itself, without a copy of its elements.
+// A member is a number, a std::byte, a text (std::string_view), another schema, a std::array of numbers or a std::span
+// of any of these: a sequence. A packed sequence (see Packed) is written by itself, without a copy of its elements.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -88,6 +88,7 @@ constexpr std::string_view number_name() {
 template <class T>
 std::string type_text() {
   if constexpr (std::is_arithmetic_v<T>) return std::string(number_name<T>());
+  else if constexpr (std::is_same_v<T, std::byte>) return "byte";
   else if constexpr (std::is_same_v<T, std::string_view>) return "string";
   else if constexpr (Schema<T>) return std::string(T::schema_name);
   else if constexpr (detail::Fixed<T>::value)
@@ -105,6 +106,7 @@ void for_each_member(const S& value, const Each& each) {
 template <class T>
 void write(CdrWriter& to, const T& value) {
   if constexpr (std::is_arithmetic_v<T>) to.number(value);
+  else if constexpr (std::is_same_v<T, std::byte>) to.number(static_cast<uint8_t>(value));
   else if constexpr (std::is_same_v<T, std::string_view>) to.text(value);
   else if constexpr (Schema<T>)
     for_each_member(value, [&](std::string_view, const auto& member) { write(to, member); });

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "graph/world/schema.hpp"
+#include "rt/log_line.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
 #include "rt/msg/point.hpp"

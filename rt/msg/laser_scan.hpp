@@ -23,7 +23,7 @@ struct LaserScan {
   Transform sensor_in_robot;
   Array<float> range_m;  ///< 0: no return
   void show(Viewer& to) const {
-    to.scan({first_angle_rad, step_rad, range_m.items()});
+    to.scan({first_angle_rad, step_rad, range_m.items(), max_range_m, sweep_s});
     to.mounted(sensor_in_robot);
   }
   TAKT_FIELDS(LaserScan, (first_angle_rad, "rad"), (step_rad, "rad"), (max_range_m, "m"), (sweep_s, "s"),

@@ -28,6 +28,7 @@ class Viewer {
   struct Scan {
     double first_angle_rad = 0, step_rad = 0;  ///< counter-clockwise from the sensor's forward axis
     std::span<const float> range_m;            ///< 0: no return
+    double max_range_m = 0, sweep_s = 0;       ///< 0: not known
   };
   struct Cells {
     ImageView<const int16_t> cells;  ///< 0 free .. 1000 occupied, -1 unknown

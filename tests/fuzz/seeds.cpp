@@ -20,6 +20,7 @@
 #include "tests/conformance/link_messages.hpp"
 #include "tests/unit/lms200/golden.hpp"
 #include "tests/unit/lms400/golden.hpp"
+#include "tests/unit/ros2_devices/scan_bytes.hpp"
 
 using namespace takt;
 using takt::fuzz::Bytes, takt::fuzz::Seeds;
@@ -181,6 +182,15 @@ void camera_seeds(Seeds& seeds) {
       }
 }
 
+void ros2_seeds(Seeds& seeds) {
+  for (const bool big_endian : {false, true})
+    for (const auto& scan : {takt::test::ScanBytes{}, takt::test::ScanBytes{.ranges = {1, 2}, .intensities = {5}}}) {
+      Bytes bytes;
+      for (const std::byte b : scan.bytes(big_endian)) bytes.push_back(std::to_integer<uint8_t>(b));
+      seeds.add_and_spoil(bytes);
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -190,15 +200,17 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path folder(argv[1]);
   Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400"), can_inputs(folder / "can"),
-      camera_inputs(folder / "camera"), link_inputs(folder / "semantic_link");
+      camera_inputs(folder / "camera"), link_inputs(folder / "semantic_link"), ros2_inputs(folder / "ros2");
   lms200_seeds(lms200_inputs);
   lms400_seeds(lms400_inputs);
   can_seeds(can_inputs);
   camera_seeds(camera_inputs);
   semantic_link_seeds(link_inputs);
+  ros2_seeds(ros2_inputs);
   const size_t of_files = takt::fuzz::file_seeds(folder);
   std::printf(
-      "seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for camera, %zu for semantic_link, %zu for files\n",
+      "seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for camera, %zu for semantic_link, %zu for ros2, %zu "
+      "for files\n",
       lms200_inputs.count(), lms400_inputs.count(), can_inputs.count(), camera_inputs.count(), link_inputs.count(),
-      of_files);
+      ros2_inputs.count(), of_files);
 }

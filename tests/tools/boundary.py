@@ -346,9 +346,9 @@ for command, places in commands:
     for place, wants, _ in places:
         tasks += [(try_place, command, places, place, kind, wants) for kind in chosen(KINDS[wants], 1 if command in SLOW else 2)]
     if command not in ("top", "double", "new"):  # they end when they are told to; `new` makes a folder
-        # `web` serves until it is told to end, unless its address cannot be written. A closed stream is as /dev/null, and a reader
+        # `web` and `ros2` serve until they are told to end, unless their address cannot be written. A closed stream is as /dev/null, and a reader
         # may leave later.
-        streams = ("stdout full",) if command == "web" else STREAMS
+        streams = ("stdout full",) if command in ("web", "ros2") else STREAMS
         tasks += [(try_stream, command, stream) for stream in chosen(streams, 1)]
 if not only:
     tasks += [(try_nested, name, graph, word, rest[0] if rest else "", kind)

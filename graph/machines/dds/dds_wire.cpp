@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <dds/dds.h>
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -14,27 +13,19 @@
 #include "graph/machines/dds/component.hpp"
 #include "graph/machines/dds/security.hpp"
 #include "graph/machines/dds/strangers.hpp"
+#include "hal/dds/interface.hpp"
 #include "rt/abi.hpp"
 
 namespace takt::machines {
 namespace {
 
+using dds::made;
+
 constexpr size_t kAtOnce = 32;
-
-dds_entity_t made(dds_entity_t entity, const std::string& what) {
-  if (entity < 0) throw std::runtime_error(fmt::format("DDS: no {}: {}", what, dds_strretcode(-entity)));
-  return entity;
-}
-
-/// One named interface, by its address; multicast for finding each other alone. What is traced, Strangers reads.
-std::string configuration(const WireOptions& options) {
-  return fmt::format(
-      "<General><Interfaces><NetworkInterface address=\"{}\"/></Interfaces><AllowMulticast>spdp</AllowMulticast>"
-      "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>1344B</FragmentSize></General>"
-      "<Internal><SocketReceiveBufferSize min=\"default\" max=\"{}B\"/></Internal>"
-      "<Tracing><Category>discovery</Category><OutputFile>/dev/null</OutputFile></Tracing>",
-      options.address, kSocketBuffer);
-}
+constexpr const char* kLargeDatagrams =
+    "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>1344B</FragmentSize>";  ///< both ends are Cyclone
+/// What is traced, Strangers reads.
+constexpr const char* kTraced = "<Tracing><Category>discovery</Category><OutputFile>/dev/null</OutputFile></Tracing>";
 
 dds_entity_t made_participant(const WireOptions& options) {
   const auto domain = static_cast<dds_domainid_t>(options.domain);
@@ -51,8 +42,7 @@ class DdsWire final : public Wire {
  public:
   explicit DdsWire(const WireOptions& options)
       : strangers_(!options.keys.empty(), options.say),
-        domain_(made(dds_create_domain(static_cast<dds_domainid_t>(options.domain), configuration(options).c_str()),
-                     fmt::format("domain on {}; is that address one of this machine?", options.address))),
+        domain_(dds::domain_on(options.address, options.domain, kLargeDatagrams, kTraced)),
         participant_(made_participant(options)) {}
   ~DdsWire() override { dds_delete(domain_); }  // with all in it
 

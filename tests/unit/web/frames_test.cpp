@@ -10,7 +10,7 @@
 #include "graph/ace/ace_registry.hpp"
 #include "graph/language/message_types.hpp"
 #include "graph/web/page_frames.hpp"
-#include "graph/web/specimen.hpp"
+#include "graph/world/specimen.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/laser_scan.hpp"
@@ -47,7 +47,7 @@ TEST_CASE("a specimen of every type is whole, and shows what its output can show
   std::map<std::string, std::vector<std::string>> kinds;
   const Capacity capacity{.width = 8, .height = 4, .channels = 3, .count = 5};
   for (const auto& [name, type] : graph::message_types(registry)) {
-    const AlignedBytes message = web::specimen(*type, capacity);
+    const AlignedBytes message = world::specimen(*type, capacity);
     CHECK_MESSAGE(type->intact(message.get(), capacity), name);
     kinds[name] = web::kinds_of(*type, capacity);
     for (const std::string& kind : kinds[name])
@@ -63,7 +63,7 @@ TEST_CASE("a specimen of every type is whole, and shows what its output can show
 
 TEST_CASE("a pair is two pictures, whose frames say whose they are") {
   const Capacity capacity{.width = 16, .height = 8, .channels = 1};
-  const AlignedBytes memory = web::specimen(MessageType::of<StereoPair>(), capacity);
+  const AlignedBytes memory = world::specimen(MessageType::of<StereoPair>(), capacity);
   auto& pair = *reinterpret_cast<StereoPair*>(memory.get());
   std::fill_n(pair.right.data(), pair.right.size, uint8_t{200});
   const web::Origin origin{"eye.pair", 7, 3'500'000'000, 1'000'000'000, 2, 4.5};
@@ -87,7 +87,7 @@ TEST_CASE("a pair is two pictures, whose frames say whose they are") {
 }
 
 TEST_CASE("near things are bright in a disparity, and what has none is black") {
-  const AlignedBytes memory = web::specimen(MessageType::of<DisparityMap>(), {.width = 16, .height = 16});
+  const AlignedBytes memory = world::specimen(MessageType::of<DisparityMap>(), {.width = 16, .height = 16});
   auto& map = *reinterpret_cast<DisparityMap*>(memory.get());
   map.disparities = 64;
   for (size_t i = 0; i < map.disparity.size; ++i) map.disparity[i] = i < 128 ? int16_t{63} : int16_t{-1};
@@ -99,7 +99,7 @@ TEST_CASE("near things are bright in a disparity, and what has none is black") {
 }
 
 TEST_CASE("a large cloud is thinned evenly, and says of how many points") {
-  const AlignedBytes memory = web::specimen(MessageType::of<PointCloud>(), {.count = 100'000});
+  const AlignedBytes memory = world::specimen(MessageType::of<PointCloud>(), {.count = 100'000});
   auto& cloud = *reinterpret_cast<PointCloud*>(memory.get());
   for (size_t i = 0; i < cloud.points.size; ++i) cloud.points[i] = {static_cast<float>(i), 0, 1};
   const Read read(web::page_frames(MessageType::of<PointCloud>(), memory.get(), "cloud", {})[0]);
@@ -114,7 +114,7 @@ TEST_CASE("a large cloud is thinned evenly, and says of how many points") {
 }
 
 TEST_CASE("a scan has its ranges and where they begin") {
-  const AlignedBytes memory = web::specimen(MessageType::of<LaserScan>(), {.count = 3});
+  const AlignedBytes memory = world::specimen(MessageType::of<LaserScan>(), {.count = 3});
   auto& scan = *reinterpret_cast<LaserScan*>(memory.get());
   scan.range_m[1] = 2.5F;
   const Read read(web::page_frames(MessageType::of<LaserScan>(), memory.get(), "scan", {})[0]);

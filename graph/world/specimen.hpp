@@ -3,7 +3,7 @@
 #include "rt/memory/aligned_bytes.hpp"
 #include "rt/msg/field.hpp"
 
-namespace takt::web {
+namespace takt::world {
 
 /// A message of zeros, as large as its output can carry, so that it shows what messages of that output can show: an
 /// empty picture shows nothing. It is sound(); a type that calls such a message unsound gives an empty one.
@@ -12,4 +12,4 @@ namespace takt::web {
 ///   type.show(message.get(), viewer);
 AlignedBytes specimen(const MessageType& type, const Capacity& capacity);
 
-}  // namespace takt::web
+}  // namespace takt::world

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/web/specimen.hpp"
+#include "graph/world/specimen.hpp"
 
 #include <cstring>
 
-namespace takt::web {
+namespace takt::world {
 namespace {
 
 /// Scalars that say how large a picture is.
@@ -36,4 +36,4 @@ AlignedBytes specimen(const MessageType& type, const Capacity& capacity) {
   return memory;
 }
 
-}  // namespace takt::web
+}  // namespace takt::world
