@@ -305,12 +305,13 @@ class Composer {
       // In a cycle the producer may come later in the order: then its capacity is not known yet, here as elsewhere.
       const SetUp producer = states[task_index_.at(result_.plan.ports[edge.port].node)];
       InputPort* const input = task.node->inputs()[edge.input];
+      const bool requests = input == task.node->control();  // it needs no size of them, and waits for none
       std::optional<Capacity> capacity = Capacity{};
-      if (producer == SetUp::done) capacity = capacity_of(edge.port);
+      if (producer == SetUp::done && !requests) capacity = capacity_of(edge.port);
       if (producer == SetUp::failed) capacity.reset();
       PortAccess::connect(*input, capacity.value_or(Capacity{}));
-      // What it would say of an input whose sizes nobody knows is no problem of its own. Of requests it needs none.
-      sound = sound && (capacity || input == task.node->control());
+      // What it would say of an input whose sizes nobody knows is no problem of its own.
+      sound = sound && (capacity || requests);
     }
     if (sound) sound = call_setup(t, error);
     if (options_.exchange != nullptr) {

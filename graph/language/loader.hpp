@@ -159,6 +159,7 @@ class Loader {
   void read_machine(const std::string& name, const nlohmann::json& value);
   void read_network();
   void check_machines();
+  void check_start_order(const std::function<std::string(const std::string&)>& home_of);
   void check_outputs(const std::function<std::string(const std::string&)>& home_of);
   void choose_machine();
 

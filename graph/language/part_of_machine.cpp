@@ -29,7 +29,12 @@ class Splitter {
     std::erase_if(graph_.devices, [&](const DeviceSpec& device) { return !here(device.id); });
     std::erase_if(graph_.subsystems, [&](const SubsystemSpec& subsystem) { return !here(subsystem.name); });
     std::erase_if(graph_.schedule.entries, [&](const auto& entry) { return !here(entry.first); });
-    for (const auto& [id, ports] : needed_) add_remote(id, ports);
+    for (const std::string& id : setup_order(whole_)) {
+      if (const auto ports = needed_.find(id); ports != needed_.end()) add_remote(id, ports->second);
+      const auto node =
+          std::find_if(graph_.nodes.begin(), graph_.nodes.end(), [&](const auto& n) { return n.id == id; });
+      if (node != graph_.nodes.end()) std::rotate(node, node + 1, graph_.nodes.end());
+    }
     for (const MachineSpec& other : graph_.machines)
       if (other.name != machine_) add_machine(other);
     for (const DeviceSpec& device : graph_.devices) ids_.insert(device.id);
@@ -138,12 +143,14 @@ class Splitter {
         std::erase_if(*list, [&](const std::string& id) { return !ids_.contains(id); });
   }
 
-  /// Ids that data of an output reach over edges of the whole graph.
-  std::set<std::string> reached_from(const PortName& from) const {
+  enum class Over { whole, part };
+  /// Ids that data of an output reach over edges of the whole graph, or over those of this part alone.
+  std::set<std::string> reached_from(const PortName& from, Over over) const {
     std::set<std::string> reached;
     for (size_t before = SIZE_MAX; before != reached.size();) {
       before = reached.size();
       for_each_edge([&](const std::string& to, const EdgeSpec& edge) {
+        if (over == Over::part && !here(to)) return;
         if (edge.from == from || reached.contains(edge.from.node)) reached.insert(to);
       });
     }
@@ -155,10 +162,10 @@ class Splitter {
     std::erase_if(graph_.chains, [&](ChainSpec& chain) {
       if (!here(chain.to.node)) return true;
       if (has(chain.from)) return false;
-      const std::set<std::string> there = reached_from(chain.from);
+      const std::set<std::string> there = reached_from(chain.from, Over::whole);
       for (const auto& [id, ports] : needed_)
         for (const std::string& port : ports)
-          if (there.contains(id) && reached_from({id, port}).contains(chain.to.node)) {
+          if (there.contains(id) && reached_from({id, port}, Over::part).contains(chain.to.node)) {
             graph_.adjusted.push_back(fmt::format("chain {}: from {}: {} is on machine {}", chain.name, id + "." + port,
                                                   chain.from.text(), home_.at(chain.from.node)));
             chain.from = {id, port};
@@ -193,6 +200,40 @@ class Splitter {
 };
 
 }  // namespace
+
+std::vector<std::string> setup_order(const GraphSpec& graph) {
+  std::vector<std::pair<std::string, std::set<std::string>>> all;  // with those whose data each reads
+  const auto add = [&](const std::string& id, const std::vector<EdgeSpec>& edges) {
+    auto& producers = all.emplace_back(id, std::set<std::string>()).second;
+    for (const EdgeSpec& edge : edges)
+      if (edge.input != "control") producers.insert(edge.from.node);
+  };
+  for (const DeviceSpec& device : graph.devices) add(device.id, device.edges);
+  for (const NodeSpec& node : graph.nodes) add(node.id, node.edges);
+  for (auto& [id, producers] : all)  // of a graph with mistakes, too
+    std::erase_if(producers, [&](const std::string& producer) {
+      return std::none_of(all.begin(), all.end(), [&](const auto& one) { return one.first == producer; });
+    });
+  const auto needs_itself = [&](const auto& one) {
+    std::set<std::string> needed = one.second;
+    for (size_t before = 0; before != needed.size();) {
+      before = needed.size();
+      for (const auto& [id, producers] : all)
+        if (needed.contains(id)) needed.insert(producers.begin(), producers.end());
+    }
+    return needed.contains(one.first);
+  };
+  std::vector<std::string> order;
+  while (!all.empty()) {
+    auto next = std::find_if(all.begin(), all.end(), [](const auto& one) { return one.second.empty(); });
+    if (next == all.end()) next = std::find_if(all.begin(), all.end(), needs_itself);
+    const std::string id = next->first;
+    order.push_back(id);
+    all.erase(next);
+    for (auto& [other, producers] : all) producers.erase(id);
+  }
+  return order;
+}
 
 GraphSpec part_of_machine(GraphSpec graph, const std::string& machine) {
   Splitter(graph, machine).take();

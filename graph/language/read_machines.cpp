@@ -133,10 +133,27 @@ void Loader::check_machines() {
     return found == home.end() ? std::string() : found->second;
   };
   check_outputs(home_of);
+  check_start_order(home_of);
   for (const auto& [id, entry] : spec_.schedule.entries)
     if (entry.on && home_of(id) != home_of(entry.on->node))
       problem(entry.position, fmt::format("{} is released by {}, which another machine runs; give it a rate",
                                           ticked(id), ticked(entry.on->text())));
+}
+
+/// A machine waits at its start for the sizes of what others send: not in a circle.
+void Loader::check_start_order(const std::function<std::string(const std::string&)>& home_of) {
+  const std::vector<std::string> order = setup_order(spec_);
+  const auto rank = [&](const std::string& id) { return std::find(order.begin(), order.end(), id); };
+  const auto check = [&](const std::string& to, const std::vector<EdgeSpec>& edges) {
+    for (const EdgeSpec& edge : edges)
+      if (edge.input != "control" && home_of(edge.from.node) != home_of(to) && rank(edge.from.node) > rank(to))
+        problem(edge.position, fmt::format("{} of machine {} reads {} of machine {}, which reads what follows from it: "
+                                           "each would wait for the other at the start; let one machine run both",
+                                           ticked(to), ticked(home_of(to)), ticked(edge.from.text()),
+                                           ticked(home_of(edge.from.node))));
+  };
+  for (const DeviceSpec& device : spec_.devices) check(device.id, device.edges);
+  for (const NodeSpec& node : spec_.nodes) check(node.id, node.edges);
 }
 
 /// What others count on, and what goes over the network in a coding, are outputs of what the machine runs. `home_of`:

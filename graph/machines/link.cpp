@@ -39,7 +39,7 @@ struct Link::Import {
   const std::function<std::optional<Capacity>()> remembered;
   const MessageType* type = nullptr;
   std::unique_ptr<Inbox> own;
-  std::atomic<Inbox*> inbox{nullptr};  ///< null: nobody takes messages yet
+  std::atomic<Inbox*> inbox{nullptr};  ///< null: the run has not begun
   uint64_t run = 0;
   Arrivals arrivals;
   std::vector<std::byte> decoded;  ///< the last message, if it came in a coding
@@ -60,10 +60,13 @@ class Link::Source final : public RemoteSource {
       const auto remembered = import->remembered ? import->remembered() : std::nullopt;
       const Capacity capacity = remembered ? *remembered : link_.fact(machine_, import->port);
       import->own = std::make_unique<Inbox>(*import->type, capacity);
-      import->inbox.store(import->own.get(), std::memory_order_release);
       return capacity;
     }
     throw SetupError(fmt::format("{} does not come from machine {}", output, machine_.name));
+  }
+  DeviceResult start(int64_t) override {  // what came before is not for this run
+    for (Import* import : imports_) import->inbox.store(import->own.get(), std::memory_order_release);
+    return {};
   }
   Inbox& inbox(size_t output) override { return *imports_[output]->own; }
   ReadStatus status(int64_t release_ns) override {

@@ -101,11 +101,13 @@ int run(int argc, char** argv) {
           ->check(CLI::Range(0, kMostDomain));
   app.add_option("--port", to.ports,
                  "output NODE.PORT to publish, several; without it all that ROS 2 has a message for");
-  app.add_option("--pictures", to.pictures, "compressed (CompressedImage, the default), image (Image) or both")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Pictures>{
-              {"compressed", Pictures::compressed}, {"image", Pictures::image}, {"both", Pictures::both}},
-          CLI::ignore_case));
+  app.add_option_function<std::string>(
+         "--pictures",
+         [&to](const std::string& word) {
+           to.pictures = word == "image" ? Pictures::image : word == "both" ? Pictures::both : Pictures::compressed;
+         },
+         "compressed (CompressedImage, the default), image (Image) or both")
+      ->check(CLI::IsMember({"compressed", "image", "both"}));
   app.add_option("--quality", to.jpeg_quality, "of JPEG, 1 to 100; 75 by default")->check(CLI::Range(1, 100));
   app.add_option("--namespace", to.name_space, "of node and topics, such as /robot_1; none by default");
   app.add_option("--odometry", to.odometry, "output that gives odom -> base_link; without it the first odometry");

@@ -6,6 +6,7 @@ graph=$source/graph/two_machines.yaml
 expect 0 "" "$takt" check "$graph"
 expect 0 "" "$takt" check "$graph" --machine robot
 expect 0 "" "$takt" check "$graph" --machine vision
+for host in robot vision detection mind; do expect 0 "" "$takt" check "$source/graph/ace_four_hosts.yaml" --machine $host; done
 expect 2 'no machine `arm`; machines: robot, vision' "$takt" check "$graph" --machine arm
 expect 2 'has no `machines`' "$takt" check "$source/graph/lasers.yaml" --machine robot
 

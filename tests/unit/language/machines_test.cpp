@@ -3,6 +3,7 @@
 #include <set>
 
 #include "fixture.hpp"
+#include "graph/language/part_of_machine.hpp"
 
 using namespace takt;
 using namespace takt::test;
@@ -87,6 +88,18 @@ TEST_CASE("Each machine has what it runs, and what it reads of others as devices
   CHECK(eyes.exported == std::vector<PortName>{{"ego_motion", "motion"}});
   CHECK(eyes.chains.empty());
   CHECK(eyes.modes.front().without == std::vector<std::string>{"stereo", "ego_motion"});
+}
+
+TEST_CASE("Machines do not wait for each other in a circle: it is refused, and parts have one order") {
+  const std::string graph = kGraph + kMachines;
+  const auto loaded = Files(graph).load();
+  REQUIRE(loaded.graph);
+  CHECK(setup_order(*loaded.graph) == std::vector<std::string>{"camera", "stereo", "ego_motion", "planner", "base"});
+  const std::string round = with(with(kGraph, "max_age: 150ms}}", "max_age: 150ms}, guess: planner.guess}"),
+                                 "exports: [planner.velocity]", "exports: [planner.velocity, planner.guess]");
+  REQUIRE(Files(round).load().graph);
+  expect_at(Files(round + kMachines).load(), "graph.yaml", round, "planner.guess}",
+            {"`ego_motion` of machine `eyes` reads `planner.guess` of machine `legs`", "let one machine run both"});
 }
 
 TEST_CASE("A device of another machine is one here, too; an age that the graph does not say is not known") {
