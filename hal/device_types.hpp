@@ -47,7 +47,13 @@ using MakeDevice =
 MakeDevice hardware(MakeDevice closed);
 
 /// What stands behind a driver.
-enum class DriverSort : uint8_t { simulated, recorded, hardware, doubled };
+enum class DriverSort : uint8_t {
+  simulated,
+  recorded,
+  hardware,
+  neighbour,  ///< another program gives what is real; it has no double
+  doubled,
+};
 
 struct DriverInfo {
   std::string_view name, doc;

@@ -120,7 +120,8 @@ std::vector<const graph::DeviceSpec*> real_devices(const graph::GraphSpec& graph
     const hal::DeviceKind* kind = registry.devices.find(device.kind);
     const hal::DriverInfo* driver = kind != nullptr ? kind->driver(device.driver) : nullptr;
     if (driver == nullptr) continue;
-    if (driver->sort == hal::DriverSort::hardware || (doubles && driver->sort == hal::DriverSort::doubled))
+    const bool is_real = driver->sort == hal::DriverSort::hardware || driver->sort == hal::DriverSort::neighbour;
+    if (is_real || (doubles && driver->sort == hal::DriverSort::doubled))
       real.push_back(&device);
   }
   const auto moves = [](const graph::DeviceSpec* device) {

@@ -156,7 +156,7 @@ int log_rescue(const LogOptions& options) {
   NewLog made;
   if (const int code = make(options.output, made); code != kOk) return code;
   const auto rescued = flight::rescue(options.file, *made.sink);
-  if (!rescued) return refuse(rescued.error(), kBadInput);
+  if (!rescued) return refuse(options.output.string() + ": " + rescued.error(), kBadInput);
   for (const std::string& damage : rescued->joined.damages) std::fprintf(stderr, "takt: %s\n", damage.c_str());
   if (const auto done = made.claim->finish(); !done) return refuse(done.error(), "--output");
   std::printf("%s: %llu messages of %.1f s, %.1f MB, from %zu files\n", rescued->run.c_str(),

@@ -31,7 +31,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 
 }  // namespace
 
-/// Counts are of the wire that calls; others read them.
+/// Under `taking_`; jobs and status read the counts.
 struct Link::Import {
   Import(Peer& from, const ImportName& name) : from(from), port(name.port), remembered(name.remembered) {}
   Peer& from;
@@ -136,11 +136,10 @@ Link::~Link() {
   sending_.request_stop();
   bell_.ring();
   if (sending_.joinable()) sending_.join();
-  const std::vector<std::string> lines = summary();
   questions_->stop();  // it sends
   wire_.reset();       // nothing comes any more
   if (!options_.say) return;
-  for (const std::string& line : lines) options_.say(line);
+  for (const std::string& line : summary()) options_.say(line);
 }
 
 Json Link::outputs_of(const Peer& machine) const {
@@ -168,7 +167,7 @@ Json Link::outputs_of(const Peer& machine) const {
 Json Link::report() const {
   Json machines = Json::array();
   const int64_t now_ns = clock_.now_ns();
-  const std::lock_guard lock(mutex_);
+  const std::scoped_lock lock(taking_, mutex_);
   for (const auto& known : peers_) {
     const int64_t heard_ns = known->heard_ns.load();
     const char* const state = known->differs.load()            ? "runs something else"
@@ -292,6 +291,7 @@ void Link::send_state() {
 }
 
 void Link::take(size_t topic, std::span<const std::byte> bytes) {
+  const std::lock_guard lock(taking_);
   if (topic < peers_.size()) take_state(bytes);
   else if (topic < 2 * peers_.size()) questions_->take(bytes);
   else take_message(*imports_[topic - 2 * peers_.size()], bytes);

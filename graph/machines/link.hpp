@@ -109,7 +109,8 @@ class Link {
   std::vector<std::unique_ptr<Peer>> peers_;
   std::vector<std::unique_ptr<Import>> imports_;
   std::unique_ptr<Questions> questions_;
-  mutable std::mutex mutex_;  ///< states of peers; never taken in a job
+  mutable std::mutex taking_;  ///< what comes, one at a time; never taken in a job
+  mutable std::mutex mutex_;   ///< states of peers; never taken in a job
   std::condition_variable changed_;
   std::vector<Outgoing> outgoing_;
   std::vector<size_t> out_topics_;  ///< by export

@@ -6,32 +6,11 @@
 
 #include "graph/world/own_schema.hpp"
 #include "graph/world/shown.hpp"
+#include "graph/world/sinks.hpp"
 #include "rt/msg/scalar.hpp"
 
 namespace takt::world {
 namespace {
-
-/// Makes forms of what is wanted.
-struct FormSink {
-  const Wanted& wanted;
-  std::vector<Form> forms;
-  bool wants(const std::string& topic, std::string_view) const { return !wanted || wanted(topic); }
-  template <Schema S>
-  void take(const std::string& topic, const S& value) {
-    forms.push_back({topic, full_name(S::schema_name), encoded(value)});
-  }
-};
-
-/// Notes what there is.
-struct OutlineSink {
-  std::vector<Outline> outlines;
-  bool wants(const std::string& topic, std::string_view schema) {
-    outlines.push_back({topic, full_name(schema)});
-    return false;
-  }
-  template <Schema S>
-  void take(const std::string&, const S&) {}
-};
 
 /// Whether the message may be looked into. Types that are described only have no functions.
 bool is_sound(const MessageType& type, const void* message) { return type.sound == nullptr || type.sound(message); }
@@ -66,7 +45,7 @@ std::string well_known(std::string_view schema, const std::tuple<S...>*) {
 
 std::vector<Form> Encoder::forms(const MessageType& type, const void* message, std::string_view node, int64_t stamp_ns,
                                  const Wanted& wanted) const {
-  FormSink sink{wanted, {}};
+  FormSink sink{wanted};
   if (!is_sound(type, message)) return {};
   if (show(type, message, sink, node, stamp_ns, options_.jpeg_quality) && sink.wants("", ""))
     sink.forms.push_back(own_form(type, message, stamp_ns));

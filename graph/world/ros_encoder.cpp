@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "graph/world/ros_shown.hpp"
+#include "graph/world/sinks.hpp"
 #include "graph/world/type_description.hpp"
 #include "rt/msg/ace/detections.hpp"
 #include "rt/msg/pose.hpp"
@@ -12,26 +13,6 @@
 
 namespace takt::world {
 namespace {
-
-struct RosForms {
-  const Wanted& wanted;
-  std::vector<Form> forms;
-  bool wants(const std::string& topic, std::string_view) const { return !wanted || wanted(topic); }
-  template <Schema S>
-  void take(const std::string& topic, const S& value) {
-    forms.push_back({topic, full_name(S::schema_name), encoded(value)});
-  }
-};
-
-struct RosOutlines {
-  std::vector<Outline> outlines;
-  bool wants(const std::string& topic, std::string_view schema) {
-    outlines.push_back({topic, std::string(schema)});
-    return false;
-  }
-  template <Schema S>
-  void take(const std::string&, const S&) {}
-};
 
 /// ROS 2 has more to say of it than a pose.
 template <class Sink>
@@ -107,13 +88,13 @@ std::string_view ros_frame::name(std::string_view takt_frame) {
 
 std::vector<Form> RosEncoder::forms(const MessageType& type, const void* message, std::string_view node,
                                     int64_t stamp_ns, const Wanted& wanted) const {
-  RosForms sink{wanted, {}};
+  FormSink sink{wanted};
   if (may_show(type, message)) show_message(type, message, sink, node, stamp_ns, options_.jpeg_quality);
   return std::move(sink.forms);
 }
 
 std::vector<Outline> RosEncoder::outline(const MessageType& type, const void* message) const {
-  RosOutlines sink;
+  OutlineSink sink;
   if (may_show(type, message)) show_message(type, message, sink, "", 0, options_.jpeg_quality);
   return std::move(sink.outlines);
 }

@@ -22,7 +22,7 @@ class RosShown final : public Viewer {
     if (std::min(image.width, image.height) <= 0 || (image.channels != 1 && image.channels != 3)) return;
     const std::string topic = below(part, "image_raw");
     raw_image(image, image.channels == 3 ? "bgr8" : "mono8", topic);
-    if (!sink_.wants(topic + "/compressed", full_name(ros::CompressedImage::schema_name))) return;
+    if (!sink_.wants(topic + "/compressed", ros::CompressedImage::schema_name)) return;
     const auto jpeg = jpeg_.compress(image);
     if (!jpeg.empty()) sink_.take(topic + "/compressed", ros::CompressedImage{own_frame(), "jpeg", jpeg});
   }
@@ -122,7 +122,7 @@ class RosShown final : public Viewer {
   }
   template <class Make>
   void show(const std::string& topic, const Make& make) {
-    if (sink_.wants(topic, full_name(decltype(make())::schema_name))) sink_.take(topic, make());
+    if (sink_.wants(topic, decltype(make())::schema_name)) sink_.take(topic, make());
   }
   Time time() const { return time_; }
   ros::Header own_frame() const { return {time_, node_}; }

@@ -50,7 +50,8 @@ namespace takt {
 void register_ros2_devices(hal::DeviceTypes& types) {
   using enum hal::SettingKind;
   types.add(
-      "laser_scanner", {"ros2", "a scan that a node of ROS 2 publishes", hal::hardware(ros2::make_laser)},
+      "laser_scanner", {"ros2", "a scan that a node of ROS 2 publishes", hal::hardware(ros2::make_laser),
+                        hal::DriverSort::neighbour},
       {
           {"topic", "ros2", text, true, "of sensor_msgs/msg/LaserScan, such as /scan", true},
           {"address", "ros2", text, false, "IP address of the interface to ROS 2; 127.0.0.1", true},

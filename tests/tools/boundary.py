@@ -53,6 +53,7 @@ WHOLE = {
     "log echo": "RECORD",
     "log export": "RECORD --output NEW",
     "log cut": "RECORD --output NEW",
+    "log rescue": "RING --output NEW",
     "log pull": "robot:out --ssh false --output OUT",
     "log serve": "SOURCE/graph",
     "devices": "",
@@ -262,7 +263,7 @@ def call(command, places, place, path):
 
 INPUTS = {"SOURCE": source, "RECORD": work / "run.mcap", "REPORT": work / "run.json", "TRACE": work / "run_trace.json",
           "CLOUD": work / "cloud.ply", "PLANES": work / "planes.ply", "IDENTITY": work / "identity.txt",
-          "SWEEPS": work / "sweeps.txt"}
+          "SWEEPS": work / "sweeps.txt", "RING": work / "run/flight/ring"}
 
 
 def prepare():
@@ -270,7 +271,7 @@ def prepare():
     INPUTS["CLOUD"].write_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
                                "property float z\nend_header\n1 2 3\n")
     code, text = run([takt, "run", source / "graph/lasers.yaml", "--clock", "virtual", "--for", "1s", "--record", INPUTS["RECORD"],
-                      "--report", INPUTS["REPORT"], "--trace", INPUTS["TRACE"]])
+                      "--report", INPUTS["REPORT"], "--trace", INPUTS["TRACE"], "--ring", "on", "--output", work / "run"])
     if code != 0:
         sys.exit(f"boundary: the run for the inputs ended with {code}: {text}")
     points = [f"{x / 10} {y / 10} {z / 10}" for x in range(20) for y in range(20) for z in range(20) if 0 in (x, y, z)]

@@ -20,6 +20,7 @@ void add_drivers(DeviceTypes& types) {
   types.add("lamp", {"double", "", none, DriverSort::doubled}, {{"world", "double", SettingKind::path, true, ""}});
   types.add("lamp", {"serial", "", none},
             {{"port", "serial", SettingKind::path, true, "", true}, {"baud", "serial", SettingKind::count, false, ""}});
+  types.add("lamp", {"radio", "", none, DriverSort::neighbour}, {{"station", "radio", SettingKind::text, true, ""}});
   types.add("lamp", {"sim", "", none, DriverSort::simulated}, {{"noise", "sim", SettingKind::number, false, ""}});
 }
 
@@ -40,7 +41,7 @@ TEST_CASE("drivers and their kind may register in any order, and are listed the 
   after.add(lamp());
   add_drivers(after);
   CHECK(order(*after.find("lamp")) ==
-        "sim serial double rate model silent_after recovers_after colour noise port baud world ");
+        "sim serial radio double rate model silent_after recovers_after colour noise port baud station world ");
   CHECK(order(*before.find("lamp")) == order(*after.find("lamp")));
 }
 
@@ -50,7 +51,7 @@ TEST_CASE("a double takes what the hardware's driver takes, but for its place") 
   types.add(lamp());
   const DeviceKind& kind = *types.find("lamp");
   for (const char* setting : {"rate", "colour", "baud", "world"}) CHECK(kind.takes("double", setting));
-  for (const char* setting : {"port", "noise", "weight"}) CHECK_FALSE(kind.takes("double", setting));
+  for (const char* setting : {"port", "noise", "station", "weight"}) CHECK_FALSE(kind.takes("double", setting));
   CHECK(kind.takes("serial", "port"));
   CHECK_FALSE(kind.takes("serial", "world"));
 }
