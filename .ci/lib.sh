@@ -4,16 +4,16 @@ export CCACHE_MAXSIZE=4G
 # What the change is compared with; without a commit before it, all is new.
 base=$(git rev-parse --verify -q "${TAKT_CI_BASE:-HEAD~1}" || git hash-object -t tree /dev/null)
 # What a commit's run needs of the Release build.
-commit_targets=(takt takt-eval takt-tools takt-web takt-bench takt_nodes_tests)
+commit_targets=(takt takt-eval takt-tools takt-web takt-ros2 takt-bench takt_nodes_tests)
 
 usage() {
   echo "ci: $1" >&2
   exit 2
 }
 
-# install COMMAND PACKAGES...: if there is no such command yet.
+# install COMMAND PACKAGES...: if there is no such command yet, or file.
 install() {
-  command -v "$1" >/dev/null && return
+  { command -v "$1" >/dev/null || [ -e "$1" ]; } && return
   apt-get install -y --no-install-recommends "${@:2}" >/dev/null 2>&1 ||
     { apt-get update >/dev/null && apt-get install -y --no-install-recommends "${@:2}" >/dev/null; }
 }
