@@ -176,10 +176,12 @@ Json Server::reply(const Json& question, uint32_t by_user) {
   if (!machine.empty()) return errands_.ask(machine, question);
   const std::string what = question.value("do", "");
   if (what != "mode" && what != "mark" && what != "stop") return reply_here(question, by_user);
-  Json others = Json::object();  // before this one: it cannot be asked once it has stopped
+  const bool last = what == "stop";  // who has stopped carries nothing
+  Json all = last ? Json::object() : reply_here(question, by_user);
+  Json others = Json::object();
   for (const std::string& name : names)
     if (name != own) others[name] = errands_.ask(name, question);
-  Json all = reply_here(question, by_user);
+  if (last) all = reply_here(question, by_user);
   all["machines"] = others;
   return all;
 }

@@ -29,6 +29,11 @@ std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
+bool is_there(const Peer& machine, int64_t at_ns) {
+  const int64_t heard_ns = machine.heard_ns.load(std::memory_order_relaxed);
+  return heard_ns != INT64_MIN && at_ns - heard_ns <= kSilent_ns;
+}
+
 }  // namespace
 
 /// Under `taking_`; jobs and status read the counts.
@@ -70,8 +75,7 @@ class Link::Source final : public RemoteSource {
   }
   Inbox& inbox(size_t output) override { return *imports_[output]->own; }
   ReadStatus status(int64_t release_ns) override {
-    const int64_t heard_ns = machine_.heard_ns.load(std::memory_order_relaxed);
-    return heard_ns == INT64_MIN || release_ns - heard_ns > kSilent_ns ? ReadStatus::no_data : ReadStatus::ok;
+    return is_there(machine_, release_ns) ? ReadStatus::ok : ReadStatus::no_data;
   }
   SourceCounts counts() const override {
     SourceCounts all;
@@ -169,11 +173,10 @@ Json Link::report() const {
   const int64_t now_ns = clock_.now_ns();
   const std::scoped_lock lock(taking_, mutex_);
   for (const auto& known : peers_) {
-    const int64_t heard_ns = known->heard_ns.load();
-    const char* const state = known->differs.load()            ? "runs something else"
-                              : heard_ns == INT64_MIN          ? "never heard"
-                              : now_ns - heard_ns > kSilent_ns ? "lost"
-                                                               : "here";
+    const char* const state = known->differs.load()                 ? "runs something else"
+                              : is_there(*known, now_ns)            ? "here"
+                              : known->heard_ns.load() == INT64_MIN ? "never heard"
+                                                                    : "lost";
     const auto clock = known->clock.offset(now_ns);
     machines.push_back({{"name", known->name},
                         {"state", state},
@@ -234,6 +237,13 @@ void Link::give_up() {
   const std::lock_guard lock(mutex_);
   gave_up_ = true;
   changed_.notify_all();
+}
+
+Json Link::ask(const std::string& machine, const Json& question) {
+  const auto known = std::find_if(peers_.begin(), peers_.end(), [&](const auto& one) { return one->name == machine; });
+  if (known == peers_.end() || !is_there(**known, clock_.now_ns()))
+    return {{"error", fmt::format("machine {} is not there", machine)}};
+  return questions_->ask(machine, question);
 }
 
 Capacity Link::fact(const Peer& of, const std::string& port) {

@@ -76,8 +76,8 @@ class Link {
   void begin(std::vector<Outgoing> outgoing);
   /// Setups that wait for another machine give up.
   void give_up();
-  /// The answer of another machine's run; see Questions. Any thread.
-  Json ask(const std::string& machine, const Json& question) { return questions_->ask(machine, question); }
+  /// The answer of another machine's run; see Questions. Of one that is not there an error at once. Any thread.
+  Json ask(const std::string& machine, const Json& question);
   /// What was seen of each other machine: [{name, state, clock_offset_ms, clock_error_ms, clock_jumps, outputs, told}].
   /// For the report. Any thread.
   Json report() const;

@@ -185,16 +185,21 @@ TEST_CASE("Questions are answered by the other machine, if it takes words from o
   pair.answer = [](const Json& question) { return Json{{"ok", true}, {"to", question}}; };
   pair.start_vision(), pair.start_robot();
   const Json question{{"do", "mode"}, {"mode", "safe_stop"}};
-  CHECK(pair.robot->ask("vision", question) == Json{{"ok", true}, {"to", question}});
-  const std::string refused = pair.vision->ask("robot", question)["error"];
-  CHECK(refused.find("machine robot takes no words from others") == 0);
+  CHECK(pair.robot->ask("arm", question) == Json{{"error", "machine arm is not there"}});
+  CHECK(soon([&] { return pair.robot->ask("vision", question) == Json{{"ok", true}, {"to", question}}; }));
+  CHECK(soon([&] {
+    return pair.vision->ask("robot", question)["error"].get<std::string>().find("takes no words from others") !=
+           std::string::npos;
+  }));
   CHECK(soon([&] { return pair.robot->report()[0]["told"] == Json{{"mode", "full"}}; }));
   CHECK(soon([&] { return pair.robot->report()[0]["clock_offset_ms"].is_number(); }));
   const Json vision = pair.robot->report()[0];
   CHECK(vision["name"] == "vision");
-  CHECK(vision["state"] == "here");
+  CHECK(soon([&] { return pair.robot->report()[0]["state"] == "here"; }));
   CHECK(std::abs(vision["clock_offset_ms"].get<double>()) == doctest::Approx(7000).epsilon(0.01));
   CHECK(vision["outputs"][0]["port"] == "map.grid");
+  pair.vision.reset();
+  CHECK(soon([&] { return pair.robot->ask("vision", question) == Json{{"error", "machine vision is not there"}}; }));
 }
 
 TEST_CASE("Words that are none, or are for somebody else, are passed over") {
