@@ -99,7 +99,8 @@ std::unique_ptr<machines::Link> make_link(const graph::GraphSpec& graph, const R
   const graph::MachineSpec& own = *std::find_if(graph.machines.begin(), graph.machines.end(),
                                                 [&](const auto& machine) { return machine.name == graph.machine; });
   for (const graph::PortName& port : graph.exported) {
-    auto& one = exports.emplace_back(port.text(), told(board, *attach::find_port(outline.plan, port.text())));
+    exports.push_back({port.text(), told(board, *attach::find_port(outline.plan, port.text()))});
+    auto& one = exports.back();
     if (const auto age = own.ages.find(port.text()); age != own.ages.end()) one.age_ns = age->second;
     if (const auto wire = own.wire.find(port.text()); wire != own.wire.end())
       one.coding = *machines::coding_of(wire->second);
