@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
 
 #include "rt/record/packed_message.hpp"
 #include "rt/sched/histogram.hpp"

@@ -6,16 +6,6 @@
 
 namespace takt::world::ros {
 
-void PackedCloud::fill(std::byte* to) const {
-  for (size_t i = 0; i < points.size(); ++i, to += kStride) {
-    const Colour colour = i < colours.size() ? colours[i] : Colour{255, 255, 255};
-    const uint8_t bgr[]{colour.b, colour.g, colour.r, 0};
-    static_assert(sizeof(Point) + sizeof bgr == kStride);
-    std::memcpy(to, &points[i], sizeof(Point));
-    std::memcpy(to + sizeof(Point), bgr, sizeof bgr);
-  }
-}
-
 void Returns::fill(std::byte* to) const {
   for (const float range : range_m) {
     const float shown = range > 0 ? range : std::numeric_limits<float>::infinity();

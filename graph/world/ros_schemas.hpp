@@ -70,22 +70,13 @@ struct PointField {
   uint32_t count = 1;
   TAKT_SCHEMA(PointField, "sensor_msgs/PointField", name, offset, datatype, count)
 };
-/// Points with their colours, 16 bytes each: x, y, z, then blue, green, red and 0, which RViz and PCL read as `rgb`.
-struct PackedCloud {
-  using Element = uint8_t;
-  static constexpr size_t kStride = 16;
-  std::span<const Point> points;
-  std::span<const Colour> colours;  ///< of the first points; the others are white
-  size_t size() const { return points.size() * kStride; }
-  void fill(std::byte* to) const;
-};
 struct PointCloud2 {
   Header header;
   uint32_t height = 1, width = 0;
   std::span<const PointField> fields;
   bool is_bigendian = false;
   uint32_t point_step = 0, row_step = 0;
-  PackedCloud data;
+  PackedPoints data;  ///< bgr0
   bool is_dense = false;
   TAKT_SCHEMA(PointCloud2, "sensor_msgs/PointCloud2", header, height, width, fields, is_bigendian, point_step, row_step,
               data, is_dense)

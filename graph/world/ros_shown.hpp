@@ -37,8 +37,10 @@ class RosShown final : public Viewer {
                                                {"rgb", 12, ros::kFloat32, 1}};
     const auto count = static_cast<uint32_t>(points.size());
     show("", [&] {
-      constexpr uint32_t kStep = ros::PackedCloud::kStride;
-      return ros::PointCloud2{own_frame(), 1, count, kFields, false, kStep, count * kStep, {points, colours}, true};
+      constexpr uint32_t kStep = PackedPoints::kStride;
+      return ros::PointCloud2{own_frame(), 1,     count,         kFields,
+                              false,       kStep, count * kStep, {points, colours, PackedPoints::Order::bgr0},
+                              true};
     });
   }
   void scan(const Viewer::Scan& scan) override {

@@ -22,10 +22,10 @@ PoseOf pose_of(const Transform& t) { return {{t.x, t.y, t.z}, rotation_of(t)}; }
 void PackedPoints::fill(std::byte* to) const {
   for (size_t i = 0; i < points.size(); ++i, to += kStride) {
     const Colour colour = i < colours.size() ? colours[i] : Colour{255, 255, 255};
-    const uint8_t rgba[]{colour.r, colour.g, colour.b, 255};
+    const uint8_t rgba[]{colour.r, colour.g, colour.b, 255}, bgr0[]{colour.b, colour.g, colour.r, 0};
     static_assert(sizeof(Point) + sizeof rgba == kStride);
     std::memcpy(to, &points[i], sizeof(Point));
-    std::memcpy(to + sizeof(Point), rgba, sizeof rgba);
+    std::memcpy(to + sizeof(Point), order == Order::rgba ? rgba : bgr0, sizeof rgba);
   }
 }
 

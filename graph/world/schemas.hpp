@@ -71,12 +71,17 @@ struct Rows {
   }
 };
 
-/// Points with their colours, 16 bytes each: x, y, z, then red, green, blue, alpha.
+/// Points with their colours, 16 bytes each: x, y, z, then the bytes of the colour.
 struct PackedPoints {
   using Element = uint8_t;
   static constexpr size_t kStride = 16;
+  enum class Order : uint8_t {
+    rgba,  ///< opaque
+    bgr0,  ///< what RViz and PCL read as `rgb`
+  };
   std::span<const Point> points;
   std::span<const Colour> colours;  ///< of the first points; the others are white
+  Order order = Order::rgba;
   size_t size() const { return points.size() * kStride; }
   void fill(std::byte* to) const;
 };
