@@ -44,8 +44,8 @@ for end in "$one k1 10.93.0.1" "$two k2 10.93.0.2"; do
 done
 
 on() { # on SPACE NAME MACHINE SECONDS OPTIONS...: a run in the background
-  ip netns exec "$1" "$takt" run "$graph" --machine "$3" --policy cooperative --for "$4s" --ring off --output "$work/$2" \
-    --report "$work/$2.json" "${@:5}" >"$work/$2.out" 2>"$work/$2.err" &
+  beside "$2" ip netns exec "$1" "$takt" run "$graph" --machine "$3" --policy cooperative --for "$4s" --ring off \
+    --output "$work/$2" --report "$work/$2.json" "${@:5}"
 }
 
 # Both have keys. Nothing of a message or a topic can be read on the cable.

@@ -50,13 +50,21 @@ recordings() {
   [ -d "$recordings" ] || { echo "FAILED: $recordings is missing (TAKT_DATA names the folder of recordings)"; exit 1; }
 }
 
+# beside NAME COMMAND... : in the background, its process in $!, what it says in NAME.out and NAME.err of $work. What an
+# earlier one of that name said is gone before this returns: nobody waits for a word and reads the one of before.
+beside() {
+  : >"$work/$1.out"
+  : >"$work/$1.err"
+  "${@:2}" >"$work/$1.out" 2>"$work/$1.err" &
+}
+
 # start_run NAME OPTIONS... : in the background, its process in $run; returns once it can be attached to. However long
 # that takes: under a sanitizer it is many seconds. Under $policy; empty: that of the schedule, where the kernel grants it.
 policy=cooperative
 start_run() {
   local name=$1
   shift
-  "$takt" run ${policy:+--policy "$policy"} --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
+  beside "$name" "$takt" run ${policy:+--policy "$policy"} --output "$work/$name" "$@"
   run=$!
   attachable $run "$name"
 }

@@ -34,8 +34,8 @@ for end in "$one m1 10.93.0.1" "$two m2 10.93.0.2"; do
 done
 
 on() { # on SPACE NAME MACHINE SECONDS GRAPH OPTIONS...: a run in the background
-  ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off --output "$work/$2" \
-    --report "$work/$2.json" "${@:6}" >"$work/$2.out" 2>"$work/$2.err" &
+  beside "$2" ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off \
+    --output "$work/$2" --report "$work/$2.json" "${@:6}"
 }
 on $one robot robot 18 "$graph"
 robot=$!

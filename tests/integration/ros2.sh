@@ -30,7 +30,7 @@ for end in "$one r1 10.94.0.1" "$two r2 10.94.0.2"; do
   ip -n "$space" link set lo up
 done
 publish() { # publish OPTIONS...: takt ros2 in the background, its process in $ros2
-  ip netns exec $one "$takt" ros2 --address 10.94.0.1 --domain $domain "$@" >"$work/ros2.out" 2>"$work/ros2.err" &
+  beside ros2 ip netns exec $one "$takt" ros2 --address 10.94.0.1 --domain $domain "$@"
   ros2=$!
   said "follows ace" "$work/ros2.err"
 }
@@ -100,7 +100,7 @@ trap 'kill $run $ros2 2>/dev/null; rm -f "$heard"; ip netns del $one; ip netns d
 sed 's#^  sim: .*#  sim: {default: {driver: sim, world: worlds/lab.xml}, front_laser: {driver: ros2, domain: '$domain', topic: /takt/front_laser/scan, beams: 181, fov: 180deg, range: 8m, latency: 100ms}}#' \
   "$source/graph/lasers.yaml" >"$heard"
 start_run makes "$source/graph/lasers.yaml" --for 0s
-ip netns exec $one "$takt" ros2 --domain $domain --run $run >/dev/null 2>"$work/ros2.err" &
+beside ros2 ip netns exec $one "$takt" ros2 --domain $domain --run $run
 ros2=$!
 said "follows lasers" "$work/ros2.err"
 expect 0 "" ip netns exec $one "$takt" run "$heard" --policy cooperative --for 8s --ring off --output "$work/hears" --report "$work/hears.json"

@@ -8,7 +8,7 @@ expect 0 "" "$takt" run "$graph" --clock virtual --for 20s --record "$work/run.m
 
 # begin OPTIONS... : a replay in the background, its process in $replay; returns once it can be looked at.
 begin() {
-  "$takt" replay "$work/run.mcap" --output "$work/replayed" "$@" >"$work/replay.out" 2>"$work/replay.err" &
+  beside replay "$takt" replay "$work/run.mcap" --output "$work/replayed" "$@"
   replay=$!
   attachable $replay replay
 }

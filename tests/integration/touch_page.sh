@@ -33,7 +33,7 @@ sed 's/^policy: .*/policy: cooperative/; $a\  person: {rate: 5, budget: 2ms}' "$
 
 port=$((20000 + $$ % 12000))  # below those that the kernel gives to clients
 start_run mission "$graph" --isolate none --for 0s --record "$work/mission.mcap"
-"$takt" web --port $port >"$work/web.out" 2>"$work/web.err" &
+beside web "$takt" web --port $port
 web=$!
 said "#token=" "$work/web.out"
 (cd "$work/client" && node touch.mjs "$(head -n 1 "$work/web.out")" "$work/touch.png") >"$work/touch.json" || fail "the screen"

@@ -7,7 +7,7 @@ port=$((20000 + $$ % 12000))  # below those that the kernel gives to clients
 
 # serve OPTIONS... : takt web in the background, its process in $web, the address to open in $address, the token in $token.
 serve() {
-  "$takt" web --port $port "$@" >"$work/web.out" 2>"$work/web.err" &
+  beside web "$takt" web --port $port "$@"
   web=$!
   said "#token=" "$work/web.out"
   address=$(head -n 1 "$work/web.out")
@@ -113,7 +113,7 @@ after=$("$takt" top --once --json --run $run | python3 -c 'import json, sys; pri
 serve
 if [ -d "$work/pictures" ]; then
   echo "=== a process that is killed comes back on the page, which stops the run"
-  client end.mjs "$address" people >"$work/end.json" || fail "the end in the page"
+  client end.mjs "$address" people >"$work/end.json" || { fail "the end in the page"; "$takt" stop --run $run; }
   cat "$work/end.json"
   wait $run
   [ $? -le 1 ] || fail "the run: $(tail -n 3 "$work/main.err")"
