@@ -47,7 +47,7 @@ std::string_view Client::speech() {
 void Client::take(std::string_view text) {
   auto task = parse_task(text);
   if (!task) return say(task.error());
-  if (task->verb == Verb::tell) return tell(*task);
+  if (informs(task->verb)) return task->verb == Verb::tell ? tell(*task) : edit(*task);
   if (task_) say(fmt::format("I leave off: {}", task_text_));
   forget_task();
   if (task->verb == Verb::stop) return say("I stop");
@@ -68,6 +68,24 @@ void Client::tell(const Task& task) {
     }
   }
   news_ = true;
+}
+
+/// What rests on an object is gone with it, as another may get its id.
+void Client::edit(const Task& task) {
+  const bool removes = task.verb == Verb::remove;
+  if (removes && task_ && (task_->verb == Verb::goal || task_->verb == Verb::act))
+    return say(fmt::format("{} stays until this is over: {}", task.words[0], task_text_));
+  const auto object = knowledge_.object_named(task.words.back());
+  const auto done = knowledge_.edit(task);
+  if (!done) return say(done.error());
+  say(fmt::format("I believe that {}", *done));
+  news_ = true;
+  if (!removes) return;
+  const auto rests_on_it = [&](const Deed& deed) {
+    return std::find(deed.objects.begin(), deed.objects.end(), *object) != deed.objects.end();
+  };
+  if (rests_on_it(command_.deed)) command_.deed = {};
+  if (std::erase_if(records_, [&](const StepRecord& r) { return rests_on_it(r.deed); }) > 0) ++plan_revision_;
 }
 
 void Client::forget_task() {
@@ -126,6 +144,9 @@ void Client::be_idle() {
     case Verb::rotate: return single_leg([&] { driving_.rotate(task_->amount); });
     case Verb::ahead: return single_leg([&] { driving_.ahead(task_->amount); });
     case Verb::tell:
+    case Verb::add:
+    case Verb::move:
+    case Verb::remove:
     case Verb::stop: return;
   }
 }

@@ -66,7 +66,7 @@ class Client {
   bool look(const navigation::OccupancyView& grid) { return driving_.look(grid); }
   /// After objects were reported.
   void note_news() { news_ = true; }
-  /// A task in words; it ends what is under way, unless it tells something.
+  /// A task in words; it ends what is under way, unless it says something of the world.
   void take(std::string_view text);
   /// The numbers of commands go on after this one.
   void go_on_after(uint32_t command) { command_.number = command; }
@@ -97,6 +97,7 @@ class Client {
   void fire(Event event) { mode_ = next(mode_, event).value_or(mode_); }
   void say(std::string_view text);
   void tell(const Task& task);
+  void edit(const Task& task);
   void end(std::string_view what);
   void forget_task();
 

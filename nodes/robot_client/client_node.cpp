@@ -61,7 +61,12 @@ class RobotClientNode final : public Node {
   }
 
   void start(int64_t) override {
-    if (const ObjectReports* known = map_.handed_over()) learn(*known, {}, 0);
+    if (const ObjectReports* known = map_.handed_over()) {
+      std::vector<std::string_view> names;
+      for (uint32_t i = 0; i < known->names.size; ++i) names.push_back(text_of(known->names[i].name));
+      knowledge_->keep_only(names);  // not what of the network somebody has removed
+      learn(*known, {}, 0);
+    }
     if (const ActionCommand* last = action_.handed_over()) client_->go_on_after(last->number);
     if (const RobotTask* last = taken_.handed_over()) {
       task_number_ = last->number;

@@ -40,6 +40,36 @@ NodeId Knowledge::see(const Report& report, std::span<const ReportedState> state
   return node;
 }
 
+tl::expected<std::string, std::string> Knowledge::edit(const Task& task) {
+  const std::string& object = task.words.back();
+  const auto refused = [&](semantic::NetworkError error) {
+    return tl::make_unexpected(
+        fmt::format("{} at {:.2f} m, {:.2f} m: {}", object, task.x_m, task.y_m, to_string(error)));
+  };
+  if (task.verb == Verb::add) {
+    const NodeId type = map_.network().find(task.words[0]);
+    if (type == kNoNode || map_.network().kind(type) != Kind::type)
+      return tl::make_unexpected(fmt::format("there is no type {}; known are: {}", task.words[0], names(Kind::type)));
+    const auto added = map_.add_object(type, task.x_m, task.y_m, object);
+    if (!added) return refused(added.error());
+    map_.object(*added).confidence = 1;
+    ++revision_;
+    return fmt::format("{} {} is at {:.2f} m, {:.2f} m", task.words[0], object, task.x_m, task.y_m);
+  }
+  const auto node = object_named(object);
+  if (!node) return tl::make_unexpected(node.error());
+  if (task.verb == Verb::move && !map_.move(*node, task.x_m, task.y_m)) return refused(semantic::NetworkError::outside);
+  if (task.verb == Verb::remove) map_.remove(*node);
+  ++revision_;
+  return task.verb == Verb::move ? fmt::format("{} is at {:.2f} m, {:.2f} m", object, task.x_m, task.y_m)
+                                 : fmt::format("there is no {}", object);
+}
+
+void Knowledge::keep_only(std::span<const std::string_view> names) {
+  for (const NodeId node : map_.all(Kind::object))
+    if (std::find(names.begin(), names.end(), name(node)) == names.end()) map_.remove(node);
+}
+
 std::vector<navigation::Place> Knowledge::places(std::span<const NodeId> objects) const {
   std::vector<navigation::Place> places;
   for (const NodeId object : objects) places.push_back({map_.object(object).x_m, map_.object(object).y_m});

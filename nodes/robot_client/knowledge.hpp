@@ -52,11 +52,17 @@ class Knowledge {
     map_.set_state(fact.object, fact.attribute, fact.value);
     ++revision_;
   }
+  /// A task of the verbs add, move and remove: the sentence says what is believed now; the error what is not known, and
+  /// what is. Ids of what is removed are given to others.
+  tl::expected<std::string, std::string> edit(const Task& task);
+  /// Forgets all objects but those of these names.
+  void keep_only(std::span<const std::string_view> names);
   /// Rises with whatever is reported or believed.
   uint32_t revision() const { return revision_; }
 
   /// The error names what is not known, and what is.
   tl::expected<planner::Goal, std::string> understand(const FactText& fact) const;
+  tl::expected<NodeId, std::string> object_named(std::string_view name) const;
   /// An action and an object for each of its roles.
   tl::expected<Deed, std::string> understand(std::span<const std::string> words) const;
 
@@ -74,7 +80,6 @@ class Knowledge {
 
  private:
   std::string names(semantic::Kind kind) const;
-  tl::expected<NodeId, std::string> object_named(std::string_view name) const;
 
   semantic::SemanticMap map_;
   uint32_t revision_ = 1;

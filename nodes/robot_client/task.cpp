@@ -16,14 +16,17 @@ namespace {
 constexpr std::string_view kBlank = " \t\r\n,";
 constexpr double kFarthest = 1e4;  // m or rad
 
-constexpr std::array<std::pair<std::string_view, Verb>, 8> kVerbs{{{"goal", Verb::goal},
-                                                                   {"do", Verb::act},
-                                                                   {"drive", Verb::drive},
-                                                                   {"rotate", Verb::rotate},
-                                                                   {"ahead", Verb::ahead},
-                                                                   {"explore", Verb::explore},
-                                                                   {"tell", Verb::tell},
-                                                                   {"stop", Verb::stop}}};
+constexpr std::array<std::pair<std::string_view, Verb>, 11> kVerbs{{{"goal", Verb::goal},
+                                                                    {"do", Verb::act},
+                                                                    {"drive", Verb::drive},
+                                                                    {"rotate", Verb::rotate},
+                                                                    {"ahead", Verb::ahead},
+                                                                    {"explore", Verb::explore},
+                                                                    {"tell", Verb::tell},
+                                                                    {"add", Verb::add},
+                                                                    {"move", Verb::move},
+                                                                    {"remove", Verb::remove},
+                                                                    {"stop", Verb::stop}}};
 
 std::vector<std::string_view> split(std::string_view text) {
   std::vector<std::string_view> words;
@@ -68,7 +71,7 @@ tl::expected<Task, std::string> parse_task(std::string_view text) {
   if (!words.empty())
     verb = std::find_if(kVerbs.begin(), kVerbs.end(), [&](const auto& entry) { return entry.first == words[0]; });
   if (verb == kVerbs.end())
-    return wrong(text, "goal, do, drive, rotate, ahead, explore, tell or stop, and what it needs");
+    return wrong(text, "goal, do, drive, rotate, ahead, explore, tell, add, move, remove or stop, and what it needs");
   task.verb = verb->second;
   const size_t arguments = words.size() - 1;
   const auto number = [&](size_t i, bool angle, double& into) {
@@ -100,6 +103,20 @@ tl::expected<Task, std::string> parse_task(std::string_view text) {
       break;
     case Verb::ahead:
       if (arguments != 1 || !number(1, false, task.amount)) return wrong(text, "ahead DISTANCE, in m");
+      break;
+    case Verb::add:
+      if (arguments != 4 || !number(3, false, task.x_m) || !number(4, false, task.y_m))
+        return wrong(text, "add TYPE OBJECT X Y, in m");
+      task.words.assign(words.begin() + 1, words.begin() + 3);
+      break;
+    case Verb::move:
+      if (arguments != 3 || !number(2, false, task.x_m) || !number(3, false, task.y_m))
+        return wrong(text, "move OBJECT X Y, in m");
+      task.words.emplace_back(words[1]);
+      break;
+    case Verb::remove:
+      if (arguments != 1) return wrong(text, "remove OBJECT");
+      task.words.emplace_back(words[1]);
       break;
     case Verb::explore:
     case Verb::stop:

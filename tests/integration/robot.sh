@@ -61,6 +61,16 @@ expect 0 "" "$takt" robot ask bottle_1
 prints "bottle_1 is a bottle at 3.00 m, 1.00 m; level=full closed=true"
 expect 2 "it knows: cup_1, bottle_1, bottle_2" "$takt" robot ask cup_9
 expect 2 "level=full" "$takt" robot ask cup_1.taste
+expect 0 "" "$takt" robot task add cup cup_3 1 -2
+said "I believe that cup cup_3 is at 1.00 m, -2.00 m"
+expect 0 "" "$takt" robot task move cup_3 1 2
+said "I believe that cup_3 is at 1.00 m, 2.00 m"
+expect 0 "" "$takt" robot ask cup_3
+prints "cup_3 is a cup at 1.00 m, 2.00 m"
+expect 0 "" "$takt" robot task remove cup_3
+said "I believe that there is no cup_3"
+expect 0 "" "$takt" robot task remove cup_3
+said "there is no object cup_3; known are: cup_1, bottle_1, bottle_2"
 expect 0 "" "$takt" robot task -- ahead -0.3
 said "ahead -0.3: done"
 echo "goal cup_1.level=full" >"$work/person"

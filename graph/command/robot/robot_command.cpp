@@ -180,8 +180,10 @@ void add_robot(CLI::App& app, RobotOptions& o, int& exit_code) {
   add("tell", "tells what is so: cup_1.level=empty", " cup_1.level=empty", [&] { return hand_in(o, "tell "); })
       ->add_option("facts", o.words, "OBJECT.ATTRIBUTE=VALUE, several")
       ->required();
-  add("task", "any task: drive 3 1 | rotate 90deg | ahead 0.5 | explore | do fill cup_1 bottle_2 | stop", " drive 3 1",
-      [&] { return hand_in(o, ""); })
+  add("task",
+      "any task: drive 3 1 | rotate 90deg | ahead 0.5 | explore | do fill cup_1 bottle_2 | add cup cup_3 1 2 | "
+      "move cup_3 2 2 | remove cup_3 | stop",
+      " drive 3 1", [&] { return hand_in(o, ""); })
       ->add_option("words", o.words, "the task")
       ->required();
   add("ask", "what the robot knows of an object", " cup_1", [&] { return answer_about(o); })

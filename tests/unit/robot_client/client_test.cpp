@@ -283,6 +283,60 @@ TEST_CASE("what is told counts at once, and is planned with") {
   CHECK(stage.done == "fill cup_1 bottle_1");
 }
 
+TEST_CASE("objects are added, moved and removed by hand; what is under way goes on") {
+  Stage stage(kitchen("[9m, -1m]"));
+  stage.eyes = false;
+  const auto& map = stage.knowledge.map();
+  stage.client.take("drive 9 0");
+  stage.client.take("add cup cup_3 1.5 2");
+  stage.step();
+  CHECK(stage.has_said("I believe that cup cup_3 is at 1.50 m, 2.00 m"));
+  CHECK(stage.client.task() == "drive 9 0");
+  const NodeId cup = map.network().find("cup_3");
+  REQUIRE(cup != kNoNode);
+  CHECK(map.object(cup).x_m == 1.5);
+  const uint32_t revision = stage.knowledge.revision();
+  stage.client.take("move cup_3 1 -2");
+  CHECK(map.object(cup).y_m == -2);
+  CHECK(stage.knowledge.revision() > revision);
+  for (const auto& [words, said] : {std::pair("add cup cup_3 0 0", "another node has this name"),
+                                    {"add cup fill 0 0", "another node has this name"},
+                                    {"add lamp lamp_1 0 0", "there is no type lamp; known are: "},
+                                    {"add cup cup_4 9999 0", "lies outside of the map"},
+                                    {"move cup_3 9999 0", "lies outside of the map"},
+                                    {"move cup 1 1", "there is no object cup; known are: "},
+                                    {"remove cup_4", "there is no object cup_4; known are: "}}) {
+    CAPTURE(words);
+    stage.client.take(words);
+    stage.step();
+    CHECK(stage.has_said(said));
+  }
+  CHECK(map.object(cup).x_m == 1);
+  stage.client.take("remove cup_3");
+  stage.step();
+  CHECK(stage.has_said("I believe that there is no cup_3"));
+  CHECK(map.network().find("cup_3") == kNoNode);
+}
+
+TEST_CASE(
+    "an object that a goal may need stays until the goal is over; then nothing tells of it, and its id is another's") {
+  Stage stage(kitchen("[3.5m, -1m]"));
+  stage.client.take("goal cup_1.level=full");
+  stage.client.take("remove bottle_2");
+  stage.finish();
+  CHECK(stage.has_said("bottle_2 stays until this is over: goal cup_1.level=full"));
+  REQUIRE(stage.done == "fill cup_1 bottle_2");
+  stage.eyes = stage.actor = false;
+  stage.client.take("remove bottle_2");
+  stage.client.take("add cup cup_9 1 1");
+  stage.step();
+  CHECK(stage.client.records().empty());
+  CHECK(stage.client.command().deed.action == kNoNode);
+  std::string plan;
+  stage.client.write_plan(plan);
+  CHECK(plan == "no plan");
+}
+
 TEST_CASE("emergency: without a pose, and while it has to stop, the robot stands at once; then it goes on") {
   Stage stage(kitchen("[3.5m, -1m]"));
   stage.client.take("goal cup_1.level=full");

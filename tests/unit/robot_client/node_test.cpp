@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <numbers>
+#include <set>
 
 #include "rt/msg/ace/action.hpp"
 #include "rt/msg/ace/object_reports.hpp"
@@ -148,6 +149,22 @@ TEST_CASE("objects are believed, in the map frame and, where the pose at their s
   CHECK_FALSE(show(0, kSecond));  // the same once more
   CHECK(show(1, kSecond + 1));
   CHECK(map.places[3].x_m == doctest::Approx(1));
+}
+
+TEST_CASE("what was removed stays removed over a restart, what was added is there") {
+  Fixture before;
+  before.say(4, "remove cup_1");
+  before.step();
+  before.say(5, "add bottle bottle_7 1 2");
+  before.step();
+  CHECK(before.map->message().names.size == 3);
+  Fixture after;
+  PortAccess::hand_over(output(*after.node, "map"), &before.map->message());
+  after.node->start(kSecond);
+  after.step();
+  std::set<std::string> names;  // in the order of ids, which are given anew
+  for (const ObjectName& name : after.map->message().names.items()) names.insert(name.name);
+  CHECK(names == std::set<std::string>{"bottle_1", "bottle_2", "bottle_7"});
 }
 
 TEST_CASE("a restarted node goes on with its map, its numbers, and a task that names an end") {

@@ -29,6 +29,16 @@ TEST_CASE("tasks in words") {
   CHECK(parse_task("explore")->verb == Verb::explore);
   CHECK(parse_task("stop")->verb == Verb::stop);
   CHECK(parse_task("tell cup_1.level=empty")->verb == Verb::tell);
+  const auto add = parse_task("add cup cup_3 1.5 -2m");
+  REQUIRE(add);
+  CHECK(add->words == std::vector<std::string>{"cup", "cup_3"});
+  CHECK(add->x_m == 1.5);
+  CHECK(add->y_m == -2);
+  const auto move = parse_task("move cup_3 0 4");
+  REQUIRE(move);
+  CHECK(move->words == std::vector<std::string>{"cup_3"});
+  CHECK(move->y_m == 4);
+  CHECK(parse_task("remove cup_3")->words == std::vector<std::string>{"cup_3"});
 }
 
 TEST_CASE("what is no task is quoted, with what is valid") {
@@ -36,7 +46,7 @@ TEST_CASE("what is no task is quoted, with what is valid") {
     const char *text, *valid;
   };
   for (const Wrong& w : {Wrong{"", "goal, do, drive"},
-                         {"fly 3", "goal, do, drive, rotate, ahead, explore, tell or stop"},
+                         {"fly 3", "goal, do, drive, rotate, ahead, explore, tell, add, move, remove or stop"},
                          {"goal", "goal OBJECT.ATTRIBUTE=VALUE"},
                          {"goal cup_1", "OBJECT.ATTRIBUTE=VALUE"},
                          {"goal cup_1.=full", "OBJECT.ATTRIBUTE=VALUE"},
@@ -49,6 +59,10 @@ TEST_CASE("what is no task is quoted, with what is valid") {
                          {"drive 3 1e9", "drive X Y"},
                          {"rotate 90m", "rotate ANGLE"},
                          {"ahead 1deg", "ahead DISTANCE"},
+                         {"add cup 1 2", "add TYPE OBJECT X Y"},
+                         {"add cup cup_3 1 east", "add TYPE OBJECT X Y"},
+                         {"move cup_3 1", "move OBJECT X Y"},
+                         {"remove cup 3", "remove OBJECT"},
                          {"stop now", "stop alone"}}) {
     CAPTURE(w.text);
     const auto task = parse_task(w.text);

@@ -4,7 +4,7 @@ import { h, table, table_box } from "./dom.ts";
 import { fixed, plain } from "./format.ts";
 import type { Seen } from "./link.ts";
 import { boxes_of, list_of, text_of, things_of } from "./messages.ts";
-import { network, states_of, title_of } from "./network.ts";
+import { NetworkPlan, states_of, title_of } from "./network.ts";
 import type { Screen } from "./panel.ts";
 import type { ValueMessage } from "./protocol.ts";
 
@@ -78,11 +78,13 @@ function show_things(message: Record<string, unknown>): HTMLElement {
       ),
     );
   }
+  const plan = new NetworkPlan();
+  plan.show(things);
   const note = `${things.length} of ${of} objects, in the frame of the ${in_map ? "map" : "robot"}`;
   return h(
     "div",
     {},
-    network(things),
+    plan.root,
     table_box("Objects", table(["Object", "Type", ">x m", ">y m", ">z m", ">Sure", "State"], body)),
     h("p", { class: "quiet" }, note),
   );

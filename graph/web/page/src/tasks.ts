@@ -1,21 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the robot is to do: its task in words, the plan, and what it knows of objects, which can be corrected. For graphs
-// with a node of type robot_client; the words are those of its README.
+// What the robot is to do: its task in words, the plan, and what it knows of objects, which can be corrected. A click in
+// the plan of objects names the place of a task. For graphs with a node of type robot_client; the words are those of its
+// README.
 import { type App, guard } from "./app.ts";
 import { h, set_text, table, table_box } from "./dom.ts";
 import { fixed } from "./format.ts";
 import { text_of, type Thing, things_of } from "./messages.ts";
-import { network, title_of } from "./network.ts";
+import { NetworkPlan, type Spot, title_of } from "./network.ts";
 
 const kMost_hz = 2;
-const kVerbs = [
+const kRobot_hz = 5;
+interface Kind {
+  verb: string;
+  label: string;
+  hint: string;
+  named?: number; // words that stand before a place
+}
+const kVerbs: Kind[] = [
   { verb: "goal", label: "Make it so", hint: "cup_1.level=full" },
   { verb: "do", label: "Do", hint: "fill cup_1 bottle_2" },
-  { verb: "drive", label: "Drive to x, y", hint: "3 1.5" },
+  { verb: "drive", label: "Drive to x, y", hint: "3 1.5", named: 0 },
   { verb: "rotate", label: "Turn by", hint: "90deg" },
   { verb: "ahead", label: "Drive ahead", hint: "0.5" },
   { verb: "explore", label: "Explore", hint: "" },
   { verb: "tell", label: "Correct what it knows", hint: "cup_1.level=empty" },
+  { verb: "add", label: "There is", hint: "cup cup_3 1.5 2", named: 2 },
+  { verb: "move", label: "It is at x, y", hint: "cup_3 1.5 2", named: 1 },
+  { verb: "remove", label: "There is no", hint: "cup_3" },
   { verb: "stop", label: "Stop", hint: "" },
 ];
 
@@ -25,9 +36,12 @@ export class Tasks {
   private readonly verb = h("select", { "aria-label": "What it is to do", change: () => this.choose() });
   private readonly rest = h("input", { type: "text", "aria-label": "Of what", maxlength: 190, autocomplete: "off" });
   private readonly reply = h("p", { class: "quiet", role: "status" });
+  private readonly said = h("p", { class: "words said", role: "status" });
   private readonly status = h("p", { class: "words" });
   private readonly plan = h("pre", { class: "words" });
-  private readonly known = h("div", { class: "known" });
+  private readonly network = new NetworkPlan((spot) => this.pick(spot));
+  private readonly listed = h("div", { class: "known-list" });
+  private readonly known = h("div", { class: "known", hidden: true }, this.network.root, this.listed);
   private readonly clients_of_graph = () =>
     (this.app.store.graph?.nodes ?? []).filter((node) => node.type === "robot_client").map((node) => node.name);
   private leaves: (() => void)[] = [];
@@ -47,6 +61,7 @@ export class Tasks {
       h("summary", {}, "What the robot is to do"),
       h("form", { class: "tools", submit }, this.client, this.verb, this.rest, hand_in),
       this.reply,
+      this.said,
       this.status,
       this.plan,
       this.known,
@@ -67,7 +82,12 @@ export class Tasks {
     if (client === "" || this.leaves.length > 0) return;
     this.watch(`${client}.status`, (message) => set_text(this.status, text_of(message["text"])));
     this.watch(`${client}.plan`, (message) => set_text(this.plan, text_of(message["text"])));
+    this.watch(`${client}.speech`, (message) => set_text(this.said, text_of(message["text"])));
     this.watch(`${client}.map`, (message) => this.show_known(message));
+    const robot = this.app.store.graph?.nodes
+      .find((node) => node.name === client)
+      ?.inputs.find((input) => input.name === "odometry")?.from;
+    if (robot !== undefined) this.watch(robot, (message) => this.show_robot(message), kRobot_hz);
   }
 
   stop(): void {
@@ -80,9 +100,9 @@ export class Tasks {
     this.start();
   }
 
-  private watch(port: string, take: (message: Record<string, unknown>) => void): void {
+  private watch(port: string, take: (message: Record<string, unknown>) => void, most_hz = kMost_hz): void {
     this.leaves.push(
-      this.app.link.look(port, "value", kMost_hz, (seen) => {
+      this.app.link.look(port, "value", most_hz, (seen) => {
         if ("value" in seen) take(seen.value.message);
       }),
     );
@@ -91,10 +111,29 @@ export class Tasks {
   private choose(verb = this.verb.value, rest = ""): void {
     this.verb.value = verb;
     this.rest.value = rest;
-    const { hint } = kVerbs.find((known) => known.verb === verb)!;
+    const { hint } = this.kind();
     this.rest.hidden = hint === "";
     this.rest.placeholder = hint;
     if (rest !== "") this.rest.focus();
+  }
+
+  private kind(): Kind {
+    return kVerbs.find((known) => known.verb === this.verb.value)!;
+  }
+
+  /** The place into the task that is being written; where that needs none, the robot is to drive there. */
+  private pick({ x, y }: Spot): void {
+    const { verb, named } = this.kind();
+    const words = this.rest.value
+      .trim()
+      .split(/\s+/)
+      .slice(0, named ?? 0);
+    this.choose(named === undefined ? "drive" : verb, [...words, fixed(x, 2), fixed(y, 2)].join(" ").trim());
+  }
+
+  private show_robot(message: Record<string, unknown>): void {
+    this.network.move_robot(Number(message["x_m"]), Number(message["y_m"]), Number(message["theta_rad"]));
+    this.known.hidden = false;
   }
 
   private async hand_in(): Promise<void> {
@@ -110,15 +149,16 @@ export class Tasks {
     this.shown = now;
     const { things, of } = things_of(message);
     const body = h("tbody", {}, ...things.map((thing) => this.row(thing)));
-    this.known.replaceChildren(
-      network(things),
-      table_box("What it knows", table(["Object", "Type", ">x m", ">y m", "State"], body)),
+    this.network.show(things);
+    this.listed.replaceChildren(
+      table_box("What it knows", table(["Object", "Type", ">x m", ">y m", "State", "Change"], body)),
       h(
         "p",
         { class: "quiet" },
-        `${things.length} of ${of} objects; a name asks for a state, a state can be corrected`,
+        `${things.length} of ${of} objects; a name asks for a state, a state can be corrected, a click in the plan names a place`,
       ),
     );
+    this.known.hidden = false;
   }
 
   private row(thing: Thing): HTMLTableRowElement {
@@ -135,6 +175,7 @@ export class Tasks {
       h("td", { class: "num" }, fixed(thing.x, 2)),
       h("td", { class: "num" }, fixed(thing.y, 2)),
       h("td", {}, ...states),
+      h("td", {}, word("Move", "move", `${thing.name} `), word("Remove", "remove", thing.name)),
     );
   }
 }

@@ -227,7 +227,7 @@ check(
     await tasks.getByLabel("Of what").fill("cup_1.level=full");
     await tasks.getByRole("button", { name: "Hand over" }).click();
     await until(
-      async () => (await tasks.locator("[role=status]").textContent()) === "Handed over: goal cup_1.level=full",
+      async () => (await tasks.locator(".quiet[role=status]").textContent()) === "Handed over: goal cup_1.level=full",
       "the reply",
     );
     await tasks.getByRole("button", { name: "level=full" }).click();
@@ -241,6 +241,7 @@ check(
     );
     await tasks.getByRole("button", { name: "table_1" }).click();
     assert.equal(await tasks.getByLabel("Of what").inputValue(), "table_1.");
+    await tasks.locator(".said", { hasText: "fetch the cup" }).waitFor();
     await tasks.getByLabel("What it is to do").selectOption("explore");
     assert.equal(await tasks.getByLabel("Of what").isVisible(), false);
     await tasks.getByRole("button", { name: "Hand over" }).click();
@@ -253,6 +254,47 @@ check(
         ["robot_client", "explore"],
       ],
     );
+  },
+);
+
+check(
+  "robot: a click in the plan names where to drive, where something is and where it lies; it can be removed",
+  { view: "robot" },
+  async (page) => {
+    const tasks = page.locator(".tasks");
+    const [verb, rest] = [tasks.getByLabel("What it is to do"), tasks.getByLabel("Of what")];
+    await tasks.locator(".network .robot").waitFor();
+    // On the mark of an object, whose place is in its title.
+    const click_on = async (name) => {
+      const box = await tasks.locator(".network g", { hasText: name }).locator("circle").boundingBox();
+      await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+    };
+    const near = (text, wanted) => {
+      const numbers = text.split(" ").slice(-2).map(Number);
+      assert.ok(Math.hypot(numbers[0] - wanted[0], numbers[1] - wanted[1]) < 0.05, `${text} is not ${wanted}`);
+    };
+    await click_on("cup_1");
+    assert.equal(await verb.inputValue(), "drive");
+    near(await rest.inputValue(), [-1.8, 3.3]);
+    await verb.selectOption("add");
+    await rest.fill("cup cup_3");
+    await click_on("carton_1");
+    assert.match(await rest.inputValue(), /^cup cup_3 /);
+    near(await rest.inputValue(), [1.35, 2.65]);
+    await page.keyboard.press("Enter");
+    const row = tasks.locator("tr", { hasText: "table_1" });
+    await row.getByRole("button", { name: "Move", exact: true }).click();
+    assert.equal(await verb.inputValue(), "move");
+    await click_on("cup_1");
+    assert.match(await rest.inputValue(), /^table_1 -/);
+    await page.keyboard.press("Enter");
+    await row.getByRole("button", { name: "Remove" }).click();
+    await page.keyboard.press("Enter");
+    await until(() => asked("task").length === 3, "three tasks");
+    const words = asked("task").map((question) => question.words);
+    assert.match(words[0], /^add cup cup_3 1\.3\d 2\.6\d$/);
+    assert.match(words[1], /^move table_1 -1\.[78]\d 3\.[23]\d$/);
+    assert.equal(words[2], "remove table_1");
   },
 );
 
