@@ -19,6 +19,7 @@
 #include "graph/command/other_programs.hpp"
 #include "graph/command/replay_command.hpp"
 #include "graph/command/service_commands.hpp"
+#include "graph/command/up_command.hpp"
 #include "graph/main.hpp"
 #include "graph/plugins/plugins.hpp"
 #include "rt/abi.hpp"
@@ -63,6 +64,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   ServiceOptions service;
   MachineOptions machine;
   KeysOptions keys;
+  UpOptions up;
   BringupOptions bringup;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
@@ -74,6 +76,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_service_commands(app, service, exit_code);
   add_machine(app, machine, exit_code);
   add_keys(app, plugins, keys, exit_code);
+  add_up(app, plugins, up, exit_code);
   add_bringup(app, plugins, bringup, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);

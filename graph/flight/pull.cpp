@@ -63,6 +63,7 @@ class Pull {
     if (!robot) throw Failure(Pulled::system, robot.error());
     robot_.emplace(std::move(*robot));
     robot_->stop_when(options_.stopped);
+    robot_->say("renice -n 19 -p $$ >/dev/null 2>&1");  // the robot has better things to do
     greet();
     enter_folder();
     list();

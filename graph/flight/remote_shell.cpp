@@ -33,9 +33,7 @@ std::string shell_word(std::string_view text) {
 tl::expected<RemoteShell, std::string> RemoteShell::here() { return start({"sh"}); }
 
 tl::expected<RemoteShell, std::string> RemoteShell::over(const std::string& ssh, const std::string& host) {
-  auto shell = start({"sh", "-c", "exec " + ssh + " \"$@\"", "sh", host, "sh"});
-  if (shell) shell->say("renice -n 19 -p $$ >/dev/null 2>&1");
-  return shell;
+  return start({"sh", "-c", "exec " + ssh + " \"$@\"", "sh", host, "sh"});
 }
 
 tl::expected<RemoteShell, std::string> RemoteShell::start(const std::vector<std::string>& words) {

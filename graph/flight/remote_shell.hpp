@@ -26,8 +26,8 @@ class RemoteShell {
  public:
   /// On this machine. Error: it cannot be started.
   static tl::expected<RemoteShell, std::string> here();
-  /// `ssh`: a program and its options, as a shell reads them; it gets the host and the command as ssh does. The shell
-  /// there runs with the least priority. Error: nothing could be started; a host that does not answer ends the shell.
+  /// `ssh`: a program and its options, as a shell reads them; it gets the host and the command as ssh does. Error:
+  /// nothing could be started; a host that does not answer ends the shell.
   static tl::expected<RemoteShell, std::string> over(const std::string& ssh, const std::string& host);
   RemoteShell(RemoteShell&& other) noexcept;
   RemoteShell& operator=(RemoteShell&&) = delete;

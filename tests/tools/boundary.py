@@ -43,6 +43,7 @@ WHOLE = {
     "report": f"REPORT {GRAPH} --html NEW",
     "explain": "TRACE",
     "nodes": "obstacle_stop",
+    "up": "SOURCE/graph/two_machines.yaml --ssh false --output OUT",
     "keys": "SOURCE/graph/two_machines.yaml --out OUT",
     "bringup": f"{GRAPH} --profile doubles --doubles --device front_laser --output OUT",
     "doctor": "",
