@@ -19,45 +19,36 @@ import sys
 import tempfile
 import time
 
+from spaces import Spaces
+
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
 seconds, options = float((sys.argv[1:] or ["60"])[0]), sys.argv[2:]
 HOSTS = {name: f"10.94.0.{n}" for n, name in enumerate(("robot", "vision", "detection", "mind"), 1)}
 LEAVES, AWAY_S = "mind", 3
-SPACES = {name: f"hosts-{name}-{os.getpid()}" for name in (*HOSTS, "bridge")}
 GRAPH = root / "graph/ace_four_hosts.yaml"
 
 
-def ip(*words):
-    subprocess.run(["ip", *words], check=True)
-
-
-def lay_cables():
-    for space in SPACES.values():
-        ip("netns", "add", space)
-    ip("-n", SPACES["bridge"], "link", "add", "bridge", "type", "bridge")
-    ip("-n", SPACES["bridge"], "link", "set", "bridge", "up")
-    for host, address in HOSTS.items():
-        ip("-n", SPACES[host], "link", "add", "cable", "type", "veth", "peer", "name", host, "netns", SPACES["bridge"])
-        ip("-n", SPACES[host], "addr", "add", f"{address}/24", "dev", "cable")
-        ip("-n", SPACES["bridge"], "link", "set", host, "master", "bridge")
-        for space, device in ((host, "cable"), (host, "lo"), ("bridge", host)):
-            ip("-n", SPACES[space], "link", "set", device, "up")
-
-
-def begin(work, host, turn):
+def begin(spaces, work, host, turn):
     name = f"{host}{turn}"
-    return subprocess.Popen(["ip", "netns", "exec", SPACES[host], takt, "run", GRAPH, "--machine", host, "--for", f"{seconds}s", "--output", work / name, "--ring", "off",
-                             "--report", work / f"{name}.json", "--record", work / f"{name}.mcap", *options],
-                            stdout=subprocess.DEVNULL, stderr=open(work / f"{name}.err", "w"), start_new_session=True)
+    return spaces.begin(host, takt, "run", GRAPH, "--machine", host, "--for", f"{seconds}s", "--output", work / name, "--ring", "off", "--report",
+                        work / f"{name}.json", "--record", work / f"{name}.mcap", *options, stdout=subprocess.DEVNULL,
+                        stderr=open(work / f"{name}.err", "w"), start_new_session=True)
 
 
-def run(work):
-    runs = {host: begin(work, host, 1) for host in HOSTS}
+def bridge(spaces):
+    spaces.ip("bridge", "link", "add", "bridge", "type", "bridge")
+    spaces.ip("bridge", "link", "set", "bridge", "up")
+    for host in HOSTS:
+        spaces.ip("bridge", "link", "set", host, "master", "bridge")
+
+
+def run(spaces, work):
+    runs = {host: begin(spaces, work, host, 1) for host in HOSTS}
     time.sleep(seconds / 3)
     os.killpg(runs[LEAVES].pid, signal.SIGKILL)
     time.sleep(AWAY_S)
-    runs[f"{LEAVES} again"] = begin(work, LEAVES, 2)
+    runs[f"{LEAVES} again"] = begin(spaces, work, LEAVES, 2)
     time.sleep(seconds * 2 / 3 - AWAY_S)
     for run in runs.values():
         if run.poll() is None:
@@ -103,12 +94,9 @@ def replays(work, name):
 
 
 def main(work):
-    lay_cables()
-    try:
-        run(work)
-    finally:
-        for space in SPACES.values():
-            ip("netns", "del", space)
+    with Spaces(HOSTS, middle="bridge") as spaces:
+        bridge(spaces)
+        run(spaces, work)
     wrong = []
     for name in (*(f"{host}1" for host in HOSTS if host != LEAVES), f"{LEAVES}2"):
         file = work / f"{name}.json"

@@ -21,14 +21,14 @@ import tempfile
 import threading
 import time
 
+from spaces import Spaces
+
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
 with_keys = "--keys" in sys.argv
 arguments = [word for word in sys.argv[1:] if word != "--keys"]
 seconds = float((arguments[:1] or ["60"])[0])
 seed = int((arguments[1:] or ["1"])[0])
-MARK = os.getpid()
-SPACES = {name: f"fuzz-{name}-{MARK}" for name in ("robot", "vision")}
 ADDRESSES = {"robot": "10.93.0.1", "vision": "10.93.0.2"}
 CAPTURE_S, BATCH, PAUSE_S = 6, 10, 0.005  # 2,000 packets a second at most
 BACK_S = 3
@@ -36,25 +36,10 @@ OF_LINK = ("traversability", "vision")  # devices of the process `link`, which h
 RATE_HZ, KEPT = 15, 0.8  # of messages from the other machine; it ends a little earlier
 
 
-def ip(*words):
-    subprocess.run(["ip", *words], check=True)
-
-
-def lay_cable():
-    for space in SPACES.values():
-        ip("netns", "add", space)
-    ip("-n", SPACES["robot"], "link", "add", "cable", "type", "veth", "peer", "name", "cable", "netns", SPACES["vision"])
-    for machine, space in SPACES.items():
-        ip("-n", space, "addr", "add", f"{ADDRESSES[machine]}/24", "dev", "cable")
-        for device in ("cable", "lo"):
-            ip("-n", space, "link", "set", device, "up")
-
-
-def part(machine, work, run_s):
+def part(spaces, machine, work, run_s):
     keys = ["--keys", work / "keys" / machine] if with_keys else []
-    return subprocess.Popen(["ip", "netns", "exec", SPACES[machine], takt, "run", root / "graph/two_machines.yaml", "--machine", machine, "--for",
-                             f"{run_s}s", "--ring", "off", "--output", work / machine, "--report", work / f"{machine}.json", *keys],
-                            stdout=subprocess.DEVNULL, stderr=open(work / f"{machine}.err", "w"))
+    return spaces.begin(machine, takt, "run", root / "graph/two_machines.yaml", "--machine", machine, "--for", f"{run_s}s", "--ring", "off", "--output",
+                        work / machine, "--report", work / f"{machine}.json", *keys, stdout=subprocess.DEVNULL, stderr=open(work / f"{machine}.err", "w"))
 
 
 def capture():
@@ -164,22 +149,18 @@ def judge(report, away, said):
 
 
 def main(work):
-    lay_cable()
-    try:
+    with Spaces(ADDRESSES) as spaces:
         if with_keys:
             subprocess.run([takt, "keys", root / "graph/two_machines.yaml", "--out", work / "keys"], stdout=subprocess.DEVNULL, check=True)
-        parts = [part(machine, work, seconds + 15) for machine in ADDRESSES]
+        parts = [part(spaces, machine, work, seconds + 15) for machine in ADDRESSES]
         time.sleep(0.5)  # what they say first, too
         caught, done = {}, threading.Event()
-        thread = threading.Thread(target=attack, args=(caught, done))
+        thread = threading.Thread(target=attack, args=(spaces.names["vision"], caught, done))
         thread.start()
         away = watch(parts[0], done)
         thread.join()
         for one in parts:
             one.wait()
-    finally:
-        for space in SPACES.values():
-            subprocess.run(["ip", "netns", "del", space], check=False)
     said = (work / "robot.err").read_text()
     print(f"{caught.get('sent', 0)} packets to {len(caught.get('ports', {}))} ports in {seconds:.0f} s, seed {seed}, from "
           f"{sum(map(len, caught.get('ports', {}).values()))} captured ones")
@@ -189,11 +170,11 @@ def main(work):
     return judge(json.loads((work / "robot.json").read_text()), away, said)
 
 
-def attack(caught, done):
+def attack(space, caught, done):
     """From the namespace of the other machine: sockets belong to that of the thread that opens them."""
     try:
-        with open(f"/run/netns/{SPACES['vision']}", encoding="ascii") as space:
-            setns(space.fileno())
+        with open(f"/run/netns/{space}", encoding="ascii") as file:
+            setns(file.fileno())
         caught["ports"] = capture()
         caught["sent"] = fuzz(caught["ports"]) if caught["ports"] else 0
     finally:

@@ -14,29 +14,12 @@ import subprocess
 import sys
 import tempfile
 
+from spaces import Spaces
+
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
 seconds, size = int((sys.argv[1:] or ["60"])[0]), int((sys.argv[2:] or ["72000"])[0])
-SPACES = {"one": "10.93.1.1", "two": "10.93.1.2"}
-
-
-def ip(*words):
-    subprocess.run(["ip", *words], check=True)
-
-
-def lay_cable():
-    for space in SPACES:
-        ip("netns", "add", f"takt-{space}")
-    ip("-n", "takt-one", "link", "add", "cable", "type", "veth", "peer", "name", "cable", "netns", "takt-two")
-    for space, address in SPACES.items():
-        ip("-n", f"takt-{space}", "addr", "add", f"{address}/24", "dev", "cable")
-        ip("-n", f"takt-{space}", "link", "set", "cable", "up")
-        ip("-n", f"takt-{space}", "link", "set", "lo", "up")
-
-
-def begin(space, *words, **how):
-    return subprocess.Popen(["ip", "netns", "exec", f"takt-{space}", *map(str, words)], text=True, stdout=subprocess.PIPE,
-                            stderr=subprocess.STDOUT, **how)
+MACHINES = {"one": "10.93.1.1", "two": "10.93.1.2"}
 
 
 def write_graph(folder):
@@ -44,8 +27,8 @@ def write_graph(folder):
 name: pair
 schedule: pair_schedule.yaml
 machines:
-  one: {{address: {SPACES['one']}, runs: [makes], ages: {{maker.output: 70ms}}}}
-  two: {{address: {SPACES['two']}, runs: [reads]}}
+  one: {{address: {MACHINES['one']}, runs: [makes], ages: {{maker.output: 70ms}}}}
+  two: {{address: {MACHINES['two']}, runs: [reads]}}
 network: {{latency: 20ms, clock_error: 5ms, domain: 94}}
 subsystems:
   makes: {{exports: [maker.output], maker: {{type: load, params: {{work: 0.2ms, message_size: {size}, flood: true}}}}}}
@@ -58,9 +41,13 @@ nodes: {maker: {rate: 15, budget: 2ms}, reader: {rate: 15, budget: 2ms}}
 """)
 
 
-def over_takt(work):
+def begin(spaces, machine, *words, **how):
+    return spaces.begin(machine, *words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **how)
+
+
+def over_takt(spaces, work):
     write_graph(work)
-    one, two = (begin(machine, takt, "run", work / "pair.yaml", "--machine", machine, "--for", f"{seconds + extra}s", "--ring", "off",
+    one, two = (begin(spaces, machine, takt, "run", work / "pair.yaml", "--machine", machine, "--for", f"{seconds + extra}s", "--ring", "off",
                       "--output", work / machine) for machine, extra in (("one", 2), ("two", 0)))
     said = two.communicate()[0]
     one.communicate()
@@ -71,10 +58,10 @@ def over_takt(work):
     return float(found[2]), float(found[3]), "missing" in found[5]
 
 
-def over_cyclone():
+def over_cyclone(spaces):
     """Half of the way there and back, which is what it prints: p50 and p99 in ms, medians over its seconds."""
-    pong = begin("two", "ddsperf", "-D", seconds + 4, "pong", env={**os.environ, "CYCLONEDDS_URI": address("two")})
-    ping = begin("one", "ddsperf", "-D", seconds, "ping", "15Hz", "size", size, env={**os.environ, "CYCLONEDDS_URI": address("one")})
+    pong = begin(spaces, "two", "ddsperf", "-D", seconds + 4, "pong", env={**os.environ, "CYCLONEDDS_URI": address("two")})
+    ping = begin(spaces, "one", "ddsperf", "-D", seconds, "ping", "15Hz", "size", size, env={**os.environ, "CYCLONEDDS_URI": address("one")})
     said = ping.communicate()[0]
     pong.kill()
     rows = re.findall(r"mean ([\d.]+)us .*? 50% ([\d.]+)us .*? 99% ([\d.]+)us", said)
@@ -86,17 +73,13 @@ def over_cyclone():
     return middle(1), middle(2)
 
 
-def address(space):
-    return f'<General><Interfaces><NetworkInterface address="{SPACES[space]}"/></Interfaces></General>'
+def address(machine):
+    return f'<General><Interfaces><NetworkInterface address="{MACHINES[machine]}"/></Interfaces></General>'
 
 
 def main(work):
-    lay_cable()
-    try:
-        ours, theirs = over_takt(work), over_cyclone()
-    finally:
-        for space in SPACES:
-            ip("netns", "del", f"takt-{space}")
+    with Spaces(MACHINES) as spaces:
+        ours, theirs = over_takt(spaces, work), over_cyclone(spaces)
     if ours is None or theirs is None:
         return 1
     print(f"takt against ddsperf: p50 {ours[0] / theirs[0]:.2f}, p99 {ours[1] / theirs[1]:.2f}")

@@ -17,6 +17,8 @@ import sys
 import tempfile
 import time
 
+from spaces import Spaces
+
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
 seconds = float((sys.argv[1:] or ["20"])[0])
@@ -34,34 +36,14 @@ CASES = {
 }
 SIZE = 72_000  # 54 pieces of RTPS, in two datagrams
 wanted = sys.argv[2:] or list(CASES)
-MARK = os.getpid()
-SPACES = {name: f"relay-{name}-{MARK}" for name in ("robot", "vision", "between")}
 ADDRESSES = {"robot": "10.93.0.1", "vision": "10.93.0.2"}
 BACK_S, ENDS_S = 3 + 3, 3  # a partition and the way back; the other machine may end so much earlier
-MTU = "65535"  # nothing is cut into pieces of IP, which nobody could account for
+MTU = 65535  # nothing is cut into pieces of IP, which nobody could account for
 
 
-def ip(*words):
-    subprocess.run(["ip", *words], check=True)
-
-
-def lay_cables():
-    for space in SPACES.values():
-        ip("netns", "add", space)
-    for machine, address in ADDRESSES.items():
-        ip("-n", SPACES[machine], "link", "add", "cable", "mtu", MTU, "type", "veth", "peer", "name", machine, "mtu", MTU, "netns", SPACES["between"])
-        ip("-n", SPACES[machine], "addr", "add", f"{address}/24", "dev", "cable")
-        for space, device in ((machine, "cable"), (machine, "lo"), ("between", machine)):
-            ip("-n", SPACES[space], "link", "set", device, "up")
-
-
-def begin(space, *words, **how):
-    return subprocess.Popen(["ip", "netns", "exec", SPACES[space], *map(str, words)], text=True, **how)
-
-
-def buffer_errors(machine):
+def buffer_errors(spaces, machine):
     """Datagrams that the kernel had no room for: lost behind the relay."""
-    text = subprocess.run(["ip", "netns", "exec", SPACES[machine], "cat", "/proc/net/snmp"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    text = subprocess.run(["ip", "netns", "exec", spaces.names[machine], "cat", "/proc/net/snmp"], stdout=subprocess.PIPE, text=True, check=True).stdout
     names, values = (line.split()[1:] for line in text.splitlines() if line.startswith("Udp:"))
     return int(values[names.index("RcvbufErrors")])
 
@@ -89,15 +71,15 @@ subsystems:
     return work / "pair.yaml"
 
 
-def run(work, graph, how):
-    relay = begin("between", sys.executable, root / "tests/tools/relay.py", "robot", "vision", "--for", seconds, *how.split(), stdout=subprocess.PIPE,
-                  stderr=subprocess.DEVNULL)
+def run(spaces, work, graph, how):
+    relay = spaces.begin("between", sys.executable, root / "tests/tools/relay.py", "robot", "vision", "--for", seconds, *how.split(), stdout=subprocess.PIPE,
+                         stderr=subprocess.DEVNULL)
     time.sleep(0.5)
     runs, reports = {}, {}
     for machine in ADDRESSES:
         reports[machine] = work / f"{machine}.json"
-        runs[machine] = begin(machine, takt, "run", graph, "--machine", machine, "--for", f"{seconds + 12}s", "--ring", "off",
-                              "--output", work / machine, "--report", reports[machine], stdout=subprocess.DEVNULL, stderr=open(work / f"{machine}.err", "w"))
+        runs[machine] = spaces.begin(machine, takt, "run", graph, "--machine", machine, "--for", f"{seconds + 12}s", "--ring", "off",
+                                     "--output", work / machine, "--report", reports[machine], stdout=subprocess.DEVNULL, stderr=open(work / f"{machine}.err", "w"))
     for one in runs.values():
         one.wait()
     relay.send_signal(signal.SIGTERM)
@@ -133,10 +115,9 @@ def kept(report):
 
 def main(work):
     wrong = 0
-    lay_cables()
-    try:
+    with Spaces(ADDRESSES, middle="between", mtu=MTU) as spaces:
         for case in wanted:
-            account, reports = run(work, graph_of(case, work), CASES[case])
+            account, reports = run(spaces, work, graph_of(case, work), CASES[case])
             rows = compare(account, reports)
             print(f"{case}: {account['dropped']} of {account['frames']} frames dropped in {account['bad_s']:.0f} s")
             for output, sent, lost, missing, overtaken in rows:
@@ -147,13 +128,10 @@ def main(work):
             for machine, report in reports.items():
                 changes = ", ".join(f"{mode['name']} {mode['from_s']:.1f} to {mode['to_s']:.1f} s" for mode in report["modes"])
                 print(f"  {machine}: {100 * kept(report):.1f} % of the jobs done, {misses(report)} misses of high nodes, host stall {report['host_stall_ms']} ms, "
-                      f"{buffer_errors(machine)} datagrams without room; {changes}")
-                wrong += misses(report) + buffer_errors(machine)
+                      f"{buffer_errors(spaces, machine)} datagrams without room; {changes}")
+                wrong += misses(report) + buffer_errors(spaces, machine)
                 wrong += stayed_away(report)
             sys.stdout.flush()
-    finally:
-        for space in SPACES.values():
-            subprocess.run(["ip", "netns", "del", space], check=False)
     return 1 if wrong else 0
 
 

@@ -17,37 +17,20 @@ import sys
 import tempfile
 import time
 
+from spaces import Spaces
+
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "build/release/graph/command/takt"))
 reader = pathlib.Path(takt).parents[2] / "tests/ros2/takt-fastdds-reader"
 seconds = int((sys.argv[1:] or ["600"])[0])
-SPACES = {"takt-ros-one": "10.94.1.1", "takt-ros-two": "10.94.1.2"}
+MACHINES = {"one": "10.94.1.1", "two": "10.94.1.2"}
 DOMAIN = 57
 TOPIC = "rt/takt/head_camera/pair/left/image_raw/compressed=sensor_msgs::msg::dds_::CompressedImage_:q"
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
-def ip(*words):
-    subprocess.run(["ip", *words], check=True)
-
-
-def lay_cable():
-    one, two = SPACES
-    for space in SPACES:
-        ip("netns", "add", space)
-    ip("-n", one, "link", "add", "cable", "type", "veth", "peer", "name", "cable", "netns", two)
-    for space, address in SPACES.items():
-        ip("-n", space, "addr", "add", f"{address}/24", "dev", "cable")
-        ip("-n", space, "link", "set", "cable", "up")
-        ip("-n", space, "link", "set", "lo", "up")
-
-
-def begin(space, *words, **how):
-    return subprocess.Popen(["ip", "netns", "exec", space, *map(str, words)], text=True, **how)
-
-
-def listen(for_s):
-    return begin("takt-ros-two", reader, DOMAIN, for_s, TOPIC, stdout=subprocess.PIPE)
+def listen(spaces, for_s):
+    return spaces.begin("two", reader, DOMAIN, for_s, TOPIC, stdout=subprocess.PIPE)
 
 
 def samples(lines):
@@ -68,9 +51,9 @@ def quantile(values, share):
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
 
-def pictures(publisher):
+def pictures(spaces, publisher):
     used, memory, from_s = cpu_s(publisher), resident_mb(publisher), time.monotonic()
-    heard = samples(listen(seconds).communicate()[0].splitlines())
+    heard = samples(listen(spaces, seconds).communicate()[0].splitlines())
     share = 100 * (cpu_s(publisher) - used) / (time.monotonic() - from_s)
     if not heard:
         print("nothing was heard")
@@ -84,11 +67,11 @@ def pictures(publisher):
     return lost == 0 and p99 <= 5 and share <= 2 and len(heard) > 14 * (seconds - 5)
 
 
-def kills(times):
+def kills(spaces, times):
     longest = 0
     for _ in range(times):
         from_s = time.monotonic()
-        process = listen(30)
+        process = listen(spaces, 30)
         for line in process.stdout:
             if '"topic"' in line:
                 break
@@ -99,31 +82,28 @@ def kills(times):
     return longest <= 3
 
 
-def main(work):
-    lay_cable()
+def main(spaces, work):
     run = publisher = None
     try:
         run = subprocess.Popen([takt, "run", "--for", "0s", "--ring", "off", "--output", work / "run"], stdout=subprocess.DEVNULL)
-        publisher = begin("takt-ros-one", takt, "ros2", "--address", SPACES["takt-ros-one"], "--domain", DOMAIN, "--run", run.pid,
-                          stdout=subprocess.DEVNULL)
+        publisher = spaces.begin("one", takt, "ros2", "--address", MACHINES["one"], "--domain", DOMAIN, "--run", run.pid,
+                                 stdout=subprocess.DEVNULL)
         time.sleep(8)
         idle = cpu_s(publisher)
         time.sleep(10)
         print(f"nobody reads: takt-ros2 {10 * (cpu_s(publisher) - idle):.2f} % of a core")
-        good = pictures(publisher)
-        return 0 if kills(10) and good else 1
+        good = pictures(spaces, publisher)
+        return 0 if kills(spaces, 10) and good else 1
     finally:
         for process in (publisher, run):
             if process:
                 process.send_signal(signal.SIGINT)
                 process.wait()
-        for space in SPACES:
-            ip("netns", "del", space)
 
 
 if __name__ == "__main__":
     if os.geteuid() != 0 or not shutil.which("ip") or not reader.exists():
         print("NOT RUN: needs root, ip (iproute2) and takt-fastdds-reader (libfastrtps-dev)")
         sys.exit(77)
-    with tempfile.TemporaryDirectory(prefix="ros2") as folder:
-        sys.exit(main(pathlib.Path(folder)))
+    with tempfile.TemporaryDirectory(prefix="ros2") as folder, Spaces(MACHINES) as cable:
+        sys.exit(main(cable, pathlib.Path(folder)))

@@ -117,7 +117,7 @@ void add_up(CLI::App& app, plugin::Plugins& plugins, UpOptions& o, int& exit_cod
   up->footer(
       "Example: takt up graph/two_machines.yaml --host robot=me@robot --host vision=me@vision --folder takt --program "
       "./takt\n"
-      "Ctrl-C ends all parts, as does a connection that breaks: that of its machine.");
+      "Ctrl-C ends all parts. A connection that breaks ends the part of its machine; the others go on.");
   up->callback([&] {
     exit_code = plugins.carry_out(graph_file(o.graph), o.load, [&](const Registry& known) { return go(known, o); });
   });

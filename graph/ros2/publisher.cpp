@@ -22,11 +22,6 @@ constexpr auto kRetry = std::chrono::milliseconds(300);
 constexpr int kStateEveryMs = 1000;
 constexpr std::string_view kTf = "/tf", kTfStatic = "/tf_static", kDiagnostics = "/diagnostics";
 
-int64_t wall_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 Publication whole_run(std::string_view topic, std::string_view schema) {
   return {std::string(topic), std::string(topic), std::string(schema), profile_of(schema, topic)};
 }
@@ -70,7 +65,7 @@ std::string Publisher::follow(attach::Connection& connection, const std::atomic<
     if (!tell_wishes(connection)) break;
     if (!connection.readable(kLookMs)) continue;
     const auto line = connection.read_line();
-    taken_ns_ = wall_ns();
+    taken_ns_ = attach::wall_ns();
     if (!line || !line->is_object() || !take(connection, *line)) break;
   }
   return ending.load() ? "" : "the run has ended";
@@ -102,7 +97,7 @@ tl::expected<void, std::string> Publisher::describe(attach::Connection& connecti
   for (const Publication& publication : whole_run_publications()) offer_topic(publication, before);
   for (const auto& [name, topic] : before) participant_.remove_writer(topic.writer);
   tell_graph();
-  taken_ns_ = wall_ns();
+  taken_ns_ = attach::wall_ns();
   write(std::string(kTfStatic),
         moved(world::ros_frame::kBase, world::ros_frame::kRobot, world::ros_frame::kTaktInRos, taken_ns_));
   fmt::print(stderr, "takt ros2: follows {}, process {}: {} topics\n", graph->value("name", ""), graph->value("pid", 0),
@@ -126,7 +121,7 @@ void Publisher::offer_topic(const Publication& publication, std::map<std::string
 void Publisher::tell_graph() {
   std::vector<dds::Guid> writers;
   for (const auto& [name, topic] : topics_) writers.push_back(participant_.guid_of(topic.writer));
-  participant_.write(graph_writer_, entities(options_.name_space, participant_.guid(), writers), wall_ns());
+  participant_.write(graph_writer_, entities(options_.name_space, participant_.guid(), writers), attach::wall_ns());
 }
 
 bool Publisher::is_matched(const std::string& topic) const {
@@ -150,7 +145,7 @@ bool Publisher::tell_wishes(attach::Connection& connection) {
 }
 
 bool Publisher::take(attach::Connection& connection, const Json& line) {
-  if (stamps_.look(wall_ns(), MonotonicClock().now_ns())) ++counts_.clock_steps;
+  if (stamps_.look(attach::wall_ns(), MonotonicClock().now_ns())) ++counts_.clock_steps;
   if (line.contains("state")) {
     write(std::string(kDiagnostics), diagnostics_->of(line.at("state"), taken_ns_));
     return true;

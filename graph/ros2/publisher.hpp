@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/attach/wall_stamps.hpp"
 #include "graph/log/followed_port.hpp"
 #include "graph/ros2/diagnostics.hpp"
 #include "graph/ros2/offer.hpp"
 #include "graph/ros2/topics.hpp"
-#include "graph/ros2/wall_stamps.hpp"
 #include "graph/world/ros_encoder.hpp"
 #include "hal/dds/participant.hpp"
 
@@ -65,7 +65,7 @@ class Publisher {
   std::string odometry_;
   std::optional<Diagnostics> diagnostics_;
   std::optional<Transform> base_in_odometry_;
-  WallStamps stamps_;
+  attach::WallStamps stamps_;
   bool state_asked_ = false;
   int64_t taken_ns_ = 0;  ///< when the message that is published now came, since 1970
   Counts counts_;

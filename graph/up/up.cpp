@@ -22,6 +22,7 @@ using flight::shell_word;
 using Json = nlohmann::ordered_json;
 
 constexpr auto kLook = std::chrono::milliseconds(100);
+constexpr std::string_view kBegun = "takt up: begun";
 constexpr std::string_view kEnd = "takt up: exit ";
 constexpr int kWorstThatRan = 1;  ///< exit code of a run that took place
 
@@ -46,8 +47,9 @@ class Remote {
   Remote& operator=(const Remote&) = delete;
 
   bool ended() const { return ended_.load(); }
-  /// It ended otherwise than a run that took place.
-  bool failed() const { return ended() && part_.code > kWorstThatRan; }
+  /// It ended otherwise than a run that took place. One that was there and is out of reach is none: the others have a
+  /// mode for that.
+  bool failed() const { return ended() && part_.code > kWorstThatRan && !(part_.code == kLost && begun_); }
   void end_run() {
     const std::lock_guard lock(mutex_);
     if (!shell_) return;
@@ -86,16 +88,21 @@ class Remote {
                                   shell_word(out + "/report.json"));
     if (options_.record) run += " --record " + shell_word(out + "/run.mcap");
     return fmt::format(
-        "{{ exec 3<&0; {cd}mkdir -p {out} && rm -f {out}/report.json {out}/run.mcap || {{ echo '{end}3'; exit; }}; "
+        "{{ echo '{begun}'; exec 3<&0; {cd}mkdir -p {out} && rm -f {out}/report.json {out}/run.mcap || {{ echo '{end}3'; exit; }}; "
         "{run} {more} </dev/null 3<&- & run=$!; "
         "{{ read -r word; kill -TERM $run; }} <&3 2>/dev/null & reader=$!; "
         "wait $run; code=$?; {{ kill $reader; wait $reader; }} 2>/dev/null; echo \"{end}$code\"; }} 2>&1",
         fmt::arg("cd", options_.folder.empty() ? "" : fmt::format("cd {} && ", shell_word(options_.folder))),
-        fmt::arg("out", shell_word(out)), fmt::arg("run", run), fmt::arg("more", options_.more), fmt::arg("end", kEnd));
+        fmt::arg("out", shell_word(out)), fmt::arg("run", run), fmt::arg("more", options_.more), fmt::arg("begun", kBegun),
+        fmt::arg("end", kEnd));
   }
 
   void follow() {
     while (const auto line = shell_->line()) {
+      if (*line == kBegun) {
+        begun_ = true;
+        continue;
+      }
       if (!line->starts_with(kEnd)) {
         if (options_.told) options_.told(part_.machine, *line);
         continue;
@@ -147,6 +154,7 @@ class Remote {
   Part part_;
   std::mutex mutex_;  ///< of who speaks to the shell
   std::optional<RemoteShell> shell_;
+  bool begun_ = false;  ///< read once it has ended
   std::atomic<bool> ended_{false};
   std::thread thread_;
 };

@@ -42,7 +42,8 @@ struct Part {
 };
 
 /// In the order of `machines`. Returns once all parts have ended: after `length_s`, when `stopped` says so, or when one
-/// of them was refused or lost before it ran. A part whose connection breaks ends, too. Blocks; one call at a time.
+/// of them was refused, failed, or was not reached. A part whose connection breaks later ends, too; the others go on, in
+/// the mode that the graph has for a lost machine. Blocks; one call at a time.
 std::vector<Part> run(const std::vector<graph::MachineSpec>& machines, const Options& options);
 
 }  // namespace takt::up

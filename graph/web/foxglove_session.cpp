@@ -52,18 +52,18 @@ Json service_json(size_t id) {
   const Service& service = kServices[id];
   Json properties = Json::object();
   if (*service.member != '\0') properties[service.member] = {{"type", "string"}};
-  const auto schema = [](const char* name, const Json& of) {
-    return Json{{"encoding", "json"},
-                {"schemaName", name},
-                {"schemaEncoding", "jsonschema"},
-                {"schema", Json{{"type", "object"}, {"properties", of}}.dump()}};
+  Json told{{"id", id}, {"name", service.name}, {"type", service.name}};
+  const auto describe = [&](const char* way, const char* end, const Json& of) {
+    const std::string schema = Json{{"type", "object"}, {"properties", of}}.dump();
+    told[way] = {{"encoding", "json"},
+                 {"schemaName", std::string(service.name) + end},
+                 {"schemaEncoding", "jsonschema"},
+                 {"schema", schema}};
+    told[std::string(way) + "Schema"] = schema;  // all that Foxglove Studio 1.x reads
   };
-  const Json answer{{"ok", {{"type", "boolean"}}}, {"error", {{"type", "string"}}}};
-  return {{"id", id},
-          {"name", service.name},
-          {"type", service.name},
-          {"request", schema("question", properties)},
-          {"response", schema("answer", answer)}};
+  describe("request", "_Request", properties);
+  describe("response", "_Response", {{"ok", {{"type", "boolean"}}}, {"error", {{"type", "string"}}}});
+  return told;
 }
 
 class FoxgloveSession final : public Session {
@@ -206,8 +206,7 @@ class FoxgloveSession final : public Session {
   }
 
   void send_event(uint32_t subscription, const Json& event) {
-    const Json at = event.value("at_s", Json());
-    const int64_t at_ns = at.is_number() ? static_cast<int64_t>(at.get<double>() * 1e9) : 0;
+    const auto at_ns = event.value("wall_ns", int64_t{0});
     const std::string level = event.value("level", ""), kind = level.empty() ? event.value("kind", "") : level;
     const world::Form form = world::log_form(at_ns, event.value("node", ""), kind + ": " + event.value("text", ""),
                                              log_level(level).value_or(LogLevel::info));

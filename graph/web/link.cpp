@@ -132,6 +132,7 @@ bool Link::tell_wishes(attach::Connection& connection) {
 }
 
 bool Link::take(attach::Connection& connection, const Json& line) {
+  stamps_.look(attach::wall_ns(), MonotonicClock().now_ns());
   if (line.contains("state")) {
     take_state(line);
     return true;
@@ -165,7 +166,7 @@ void Link::show(const std::string& name, Port& port, const Json& line, const std
     else if (want.view.as.starts_with("cdr ")) topics = true;
     else if (fill()) hub_.put(want.view, page_frames(*port.type, port.memory.get(), want.view.as, origin));
   }
-  if (topics && port.recorded) show_topics(name, port, fill(), stamp_ns, bytes);
+  if (topics && port.recorded) show_topics(name, port, fill(), stamps_.of(stamp_ns), bytes);
 }
 
 void Link::show_topics(const std::string& name, const Port& port, bool filled, int64_t stamp_ns,
@@ -209,6 +210,10 @@ void Link::show_value(const View& view, const Port& port, const Json& line, cons
 
 void Link::take_state(const Json& line) {
   epoch_ns_ = line.value("epoch_ns", int64_t{0});
+  Json events = line.value("events", Json::array());
+  for (Json& event : events)
+    if (const Json at_s = event.value("at_s", Json()); at_s.is_number())
+      event["wall_ns"] = stamps_.of(epoch_ns_ + static_cast<int64_t>(at_s.get<double>() * 1e9));
   Json state = line.at("state");
   std::vector<int> pids;
   for (const Json& process : state.value("processes", Json::array())) pids.push_back(process.value("pid", 0));
@@ -216,9 +221,8 @@ void Link::take_state(const Json& line) {
   state["cpu"] = use.cpu ? Json(*use.cpu) : Json(nullptr);
   state["memory_mb"] = use.memory_mb;
   state["host_stall_ms"] = use.host_stall_ms;
-  hub_.broadcast({{"state", std::move(state)},
-                  {"jobs", line.value("jobs", Json::array())},
-                  {"events", line.value("events", Json::array())}});
+  hub_.broadcast(
+      {{"state", std::move(state)}, {"jobs", line.value("jobs", Json::array())}, {"events", std::move(events)}});
 }
 
 }  // namespace takt::web

@@ -9,6 +9,7 @@
 
 #include "graph/attach/endpoint.hpp"
 #include "graph/attach/machine_use.hpp"
+#include "graph/attach/wall_stamps.hpp"
 #include "graph/language/message_types.hpp"
 #include "graph/log/followed_port.hpp"
 #include "graph/web/hub.hpp"
@@ -61,6 +62,7 @@ class Link {
   int64_t epoch_ns_ = 0;
   const world::Encoder encoder_;
   attach::MachineUse use_;
+  attach::WallStamps stamps_;
   OwnThread thread_;
 };
 

@@ -4,11 +4,6 @@
 source "$(dirname "$0")/lib.sh" "$@"
 graph=$source/graph/two_machines.yaml
 
-not_run() {
-  echo "NOT RUN: $1"
-  [ $failures -eq 0 ] && exit 77
-  exit 1
-}
 command -v openssl >/dev/null || not_run "openssl is missing"
 expect 2 'has no `machines`' "$takt" keys "$source/graph/lasers.yaml" --out "$work/none"
 tells 0 "copy it to that machine only" "$takt" keys "$graph" --out "$work/keys" --days 30
@@ -31,17 +26,7 @@ rm "$work/open/governance.p7s"
 refused "open/governance.p7s" "$work/open" --machine robot
 
 [ -e "$(dirname "$takt")/../../rt/libtakt_dds.so" ] || not_run "built without cyclonedds-dev and cyclonedds-tools"
-command -v ip >/dev/null || not_run "ip is missing (iproute2)"
-one=takt-k1-$$ two=takt-k2-$$
-ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add k1 type veth peer name k2 netns $two ||
-  not_run "no right to make network namespaces"
-trap 'ip netns del $one; ip netns del $two; rm -rf "$source/graph/.domain_$$.yaml" "$work"' EXIT
-for end in "$one k1 10.93.0.1" "$two k2 10.93.0.2"; do
-  read -r space device address <<<"$end"
-  ip -n "$space" addr add "$address/24" dev "$device"
-  ip -n "$space" link set "$device" up
-  ip -n "$space" link set lo up
-done
+two_machines 10.93.0 'rm -f "$source/graph/.domain_$$.yaml"'
 
 on() { # on SPACE NAME MACHINE SECONDS OPTIONS...: a run in the background
   beside "$2" ip netns exec "$1" "$takt" run "$graph" --machine "$3" --policy cooperative --for "$4s" --ring off \
@@ -56,7 +41,7 @@ vision=$!
 ip netns exec $two python3 - <<'PY' || fail "what goes over the cable is not encrypted"
 import socket, time
 cable = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))
-cable.bind(("k2", 0))
+cable.bind(("cable", 0))
 cable.settimeout(0.1)
 kinds, plain, end = set(), 0, time.monotonic() + 5
 while time.monotonic() < end:

@@ -100,6 +100,30 @@ end_run() {
   [[ " $* " == *" $got "* ]] || { tail -n 30 "$work/$name.out"; fail "run $name: exit $got instead of $*"; }
 }
 
+# not_run WHY: ends the test as one that was skipped, unless something has failed already.
+not_run() {
+  echo "NOT RUN: $1"
+  [ $failures -eq 0 ] && exit 77
+  exit 1
+}
+
+# two_machines NETWORK ['COMMAND']: network namespaces $one and $two with a cable between them, NETWORK.1 and NETWORK.2; the end of the
+# cable is named `cable` in both. The command is carried out at the end, before they are gone. As root; otherwise the test is skipped.
+two_machines() {
+  command -v ip >/dev/null || not_run "ip is missing (iproute2)"
+  one=takt-one-$$ two=takt-two-$$
+  ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add cable type veth peer name cable netns $two ||
+    not_run "no right to make network namespaces"
+  # shellcheck disable=SC2064
+  trap "${2:-:}; ip netns del $one; ip netns del $two; rm -rf '$work'" EXIT
+  local space host=0
+  for space in $one $two; do
+    ip -n "$space" addr add "$1.$((host += 1))/24" dev cable
+    ip -n "$space" link set cable up
+    ip -n "$space" link set lo up
+  done
+}
+
 finish() {
   [ $failures -eq 0 ] && echo "all passed"
   exit $((failures > 0))

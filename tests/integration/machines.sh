@@ -15,23 +15,8 @@ for way in "run --clock virtual --output $work/none" "run --isolate none --outpu
   expect 2 "comes from machine vision: a part of a graph runs in real time" "$takt" $way "$graph" --machine robot --for 1s
 done
 
-not_run() {
-  echo "NOT RUN: $1"
-  [ $failures -eq 0 ] && exit 77
-  exit 1
-}
 [ -e "$(dirname "$takt")/../../rt/libtakt_dds.so" ] || not_run "built without cyclonedds-dev and cyclonedds-tools"
-command -v ip >/dev/null || not_run "ip is missing (iproute2)"
-one=takt-m1-$$ two=takt-m2-$$
-ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add m1 type veth peer name m2 netns $two ||
-  not_run "no right to make network namespaces"
-trap 'ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
-for end in "$one m1 10.93.0.1" "$two m2 10.93.0.2"; do
-  read -r space device address <<<"$end"
-  ip -n "$space" addr add "$address/24" dev "$device"
-  ip -n "$space" link set "$device" up
-  ip -n "$space" link set lo up
-done
+two_machines 10.93.0 'rm -f "$source"/graph/.*_$$.yaml'
 
 on() { # on SPACE NAME MACHINE SECONDS GRAPH OPTIONS...: a run in the background
   beside "$2" ip netns exec "$1" "$takt" run "$5" --machine "$3" --policy cooperative --for "$4s" --ring off \
@@ -80,7 +65,6 @@ PY
 
 # One mode, one parameter, one stop for both, asked for on either; not where the graph does not say so.
 trusted=$source/graph/.trusted_$$.yaml
-trap 'rm -f "$source"/graph/.*_$$.yaml; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
 sed 's/domain: 93/domain: 93, trusted: true/' "$graph" >"$trusted"
 pair() { # pair GRAPH: both parts, until they run
   on $one first robot 60 "$1"

@@ -18,24 +18,9 @@ tells 0 "machine \`vision\` has the address 203.0.113.2, which is not of a priva
 expect 2 "add --measure" "$takt" doctor --peer 10.93.4.2
 expect 3 "\`robot\` is no IP address" env TAKT_MACHINE="$work/machine.json" "$takt" doctor --measure --peer robot
 
-not_run() {
-  echo "NOT RUN: $1"
-  [ $failures -eq 0 ] && exit 77
-  exit 1
-}
-command -v ip >/dev/null || not_run "ip is missing (iproute2)"
-one=takt-p1-$$ two=takt-p2-$$
-ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add p1 type veth peer name p2 netns $two ||
-  not_run "no right to make network namespaces"
-trap 'ip netns del $one; ip netns del $two; rm -rf "$graph" "$work"' EXIT
-for end in "$one p1 10.93.4.1" "$two p2 10.93.4.2"; do
-  read -r space device address <<<"$end"
-  ip -n "$space" addr add "$address/24" dev "$device"
-  ip -n "$space" link set "$device" up
-  ip -n "$space" link set lo up
-done
+two_machines 10.93.4 'rm -f "$graph"'
 limited=no
-tc -n $one qdisc add dev p1 root tbf rate 100mbit burst 16kb latency 50ms 2>/dev/null && limited=yes
+tc -n $one qdisc add dev cable root tbf rate 100mbit burst 16kb latency 50ms 2>/dev/null && limited=yes
 for end in "$one 10.93.4.2" "$two 10.93.4.1"; do
   read -r space peer <<<"$end"
   TAKT_MACHINE=$work/$space.json ip netns exec "$space" "$takt" doctor --measure --peer "$peer" >"$work/$space.out" 2>"$work/$space.err" &

@@ -3,11 +3,6 @@
 # is by default). What that decodes is compared with takt echo. As root; without the right to make namespaces it says so.
 source "$(dirname "$0")/lib.sh" "$@"
 build=$(dirname "$takt")/../..
-not_run() {
-  echo "NOT RUN: $1"
-  [ $failures -eq 0 ] && exit 77
-  exit 1
-}
 [ -x "${takt%/*}/takt-ros2" ] || not_run "takt-ros2 is not built, since cyclonedds-dev or libssl-dev is missing"
 
 echo "=== what it refuses"
@@ -18,17 +13,8 @@ expect 1 "no run is there" "$takt" ros2 --list
 
 reader=$build/tests/ros2/takt-fastdds-reader
 [ -x "$reader" ] || not_run "no reader of another vendor: libfastrtps-dev was missing when this was built"
-command -v ip >/dev/null || not_run "ip is missing (iproute2)"
-one=takt-r1-$$ two=takt-r2-$$ domain=$((60 + $$ % 40))
-ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add r1 type veth peer name r2 netns $two ||
-  not_run "no right to make network namespaces"
-trap 'kill $run $ros2 2>/dev/null; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
-for end in "$one r1 10.94.0.1" "$two r2 10.94.0.2"; do
-  read -r space device address <<<"$end"
-  ip -n "$space" addr add "$address/24" dev "$device"
-  ip -n "$space" link set "$device" up
-  ip -n "$space" link set lo up
-done
+two_machines 10.94.0 'kill $run $ros2 2>/dev/null; rm -f "$heard"'
+domain=$((60 + $$ % 40))
 publish() { # publish OPTIONS...: takt ros2 in the background, its process in $ros2
   beside ros2 ip netns exec $one "$takt" ros2 --address 10.94.0.1 --domain $domain "$@"
   ros2=$!
@@ -96,7 +82,6 @@ end_run 0 1
 
 echo "=== driver ros2: the scans of one run in another, over loopback"
 heard=$source/graph/.ros2_$$.yaml
-trap 'kill $run $ros2 2>/dev/null; rm -f "$heard"; ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
 sed 's#^  sim: .*#  sim: {default: {driver: sim, world: worlds/lab.xml}, front_laser: {driver: ros2, domain: '$domain', topic: /takt/front_laser/scan, beams: 181, fov: 180deg, range: 8m, latency: 100ms}}#' \
   "$source/graph/lasers.yaml" >"$heard"
 start_run makes "$source/graph/lasers.yaml" --for 0s

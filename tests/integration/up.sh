@@ -12,23 +12,8 @@ expect 2 "machine \`robot\` has one already" "$takt" up $graph --host robot=one 
 expect 2 "--for" "$takt" up $graph --for fast --output "$work/none"
 [ ! -e "$work/none" ] || fail "a folder was made for nothing"
 
-not_run() {
-  echo "NOT RUN: $1"
-  [ $failures -eq 0 ] && exit 77
-  exit 1
-}
 [ -e "$(dirname "$takt")/../../rt/libtakt_dds.so" ] || not_run "built without cyclonedds-dev and cyclonedds-tools"
-command -v ip >/dev/null || not_run "ip is missing (iproute2)"
-one=takt-u1-$$ two=takt-u2-$$
-ip netns add $one 2>/dev/null && ip netns add $two && ip -n $one link add u1 type veth peer name u2 netns $two ||
-  not_run "no right to make network namespaces"
-trap 'ip netns del $one; ip netns del $two; rm -rf "$work"' EXIT
-for end in "$one u1 10.93.0.1" "$two u2 10.93.0.2"; do
-  read -r space device address <<<"$end"
-  ip -n "$space" addr add "$address/24" dev "$device"
-  ip -n "$space" link set "$device" up
-  ip -n "$space" link set lo up
-done
+two_machines 10.93.0
 cat >"$work/ssh" <<'END'
 #!/bin/sh
 # As ssh: what is between here and there may be cut.
@@ -96,6 +81,8 @@ pkill -KILL -P "$ssh" -x cat
 kill -KILL "$ssh"
 for _ in $(seq 100); do kill -0 "$vision" 2>/dev/null || break; sleep 0.1; done
 kill -0 "$vision" 2>/dev/null && fail "the part whose connection is gone runs on"
+sleep 1
+grep -q "^\[robot\] ok" "$work/cut.out" && fail "the other part has ended, too"
 kill -TERM $up_pid
 wait $up_pid
 code=$?

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // foxglove.mjs ws://HOST:PORT TOKEN SECONDS PARAM VALUE: follows every channel of takt web with Foxglove's own client and decoders,
 // sets a parameter, calls services. Prints one JSON object: by topic the schema, messages, and of scans and disparities
-// the hash of their numbers by stamp.
+// the hash of their numbers by stamp. A stamp in a message that is not that of its channel, or not of now, is a problem.
 import { createHash } from "node:crypto";
 import protocol from "@foxglove/ws-protocol";
 import rosmsg from "@foxglove/rosmsg";
@@ -39,6 +39,14 @@ function open(subProtocol, withToken) {
 const numbersOf = (schema, message) =>
   schema.endsWith("/LaserScan") ? Float32Array.from(message.ranges) : message.encoding === "16UC1" ? message.data : undefined;
 
+/// What is wrong with the stamps: of a message that has one, that of the channel.
+function stampTrouble(message, channelStamp) {
+  const away = Number(channelStamp) / 1e9 - Date.now() / 1e3;
+  if (Math.abs(away) > 60) return `its channel is ${away} s from now`;
+  const own = message.timestamp && BigInt(message.timestamp.sec) * 1000000000n + BigInt(message.timestamp.nanosec);
+  return own !== undefined && own !== channelStamp ? `stamp ${own} in the message, ${channelStamp} of its channel` : undefined;
+}
+
 async function followAll() {
   const client = open("foxglove.sdk.v1", true);
   const info = next(client, "serverInfo");
@@ -56,6 +64,8 @@ async function followAll() {
     try {
       const message = reader.readMessage(data);
       out.topics[channel.topic].messages += 1;
+      const trouble = stampTrouble(message, timestamp);
+      if (trouble) out.problems.push(`${channel.topic}: ${trouble}`);
       const numbers = numbersOf(channel.schemaName, message);
       if (numbers === undefined) return;
       const bytes = Buffer.from(numbers.buffer, numbers.byteOffset, numbers.byteLength);

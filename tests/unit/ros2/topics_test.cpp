@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "graph/ros2/diagnostics.hpp"
-#include "graph/ros2/wall_stamps.hpp"
 #include "graph/world/ros_schemas.hpp"
 #include "tests/hex.hpp"
 
@@ -73,16 +72,6 @@ TEST_CASE("the graph of ROS 2 is told of one node with its writers, byte by byte
       "00000000 01000000 aa000000000000000000000000000000");    // no reader, one writer
   REQUIRE(cdr.size() == expected.size());
   CHECK(std::memcmp(cdr.data(), expected.data(), cdr.size()) == 0);
-}
-
-TEST_CASE("equal stamps stay equal until the wall clock moves") {
-  WallStamps stamps;
-  CHECK(stamps.look(1'000'000'000'000, 5'000));
-  CHECK(stamps.of(6'000) == 1'000'000'001'000);
-  CHECK_FALSE(stamps.look(1'000'000'000'000 + WallStamps::kStep_ns, 5'000));  // slewed: not followed yet
-  CHECK(stamps.of(6'000) == 1'000'000'001'000);
-  CHECK(stamps.look(1'000'000'000'001 + WallStamps::kStep_ns, 5'000));
-  CHECK(stamps.of(6'000) == 1'000'000'001'001 + WallStamps::kStep_ns);
 }
 
 TEST_CASE("a node that has missed deadlines since the last time is a warning, a lost device an error") {

@@ -210,6 +210,12 @@ TEST_CASE("foxglove: channels with schemas, messages with their stamps, events a
   REQUIRE(first.size() == 3);
   CHECK(first[0]["op"] == "serverInfo");
   CHECK(first[1]["op"] == "advertiseServices");
+  for (const Json& service : first[1]["services"])
+    for (const auto& [way, name] : {std::pair("request", "_Request"), std::pair("response", "_Response")}) {
+      CHECK(service[way]["schemaName"] == service["type"].get<std::string>() + name);
+      CHECK(service[way]["schema"] == service[std::string(way) + "Schema"]);
+      CHECK(Json::parse(service[way]["schema"].get<std::string>())["type"] == "object");
+    }
   REQUIRE(first[2]["channels"].size() == 2);
   CHECK(first[2]["channels"][0]["topic"] == "takt/events");
   CHECK(first[2]["channels"][1] == Json{{"id", 1},
@@ -230,10 +236,12 @@ TEST_CASE("foxglove: channels with schemas, messages with their stamps, events a
   CHECK(number_at<uint32_t>(sent[0], 1) == 40);
   CHECK(number_at<uint64_t>(sent[0], 5) == 77);
   CHECK(sent[0].substr(13) == "abc");
-  scene.session->take_news(news({}, {{{"at_s", 2.0}, {"kind", "mark"}, {"node", "mind"}, {"text", "here"}}}));
+  scene.session->take_news(
+      news({}, {{{"at_s", 2.0}, {"wall_ns", 2'000'000'001}, {"kind", "mark"}, {"node", "mind"}, {"text", "here"}}}));
   sent = scene.binary();
   REQUIRE(sent.size() == 1);
   CHECK(number_at<uint32_t>(sent[0], 1) == 41);
+  CHECK(number_at<uint64_t>(sent[0], 5) == 2'000'000'001);
   CHECK(sent[0].find("mark: here") != std::string::npos);
   CHECK(scene.say({{"op", "subscribe"}, {"subscriptions", {{{"id", 42}, {"channelId", 9}}}}}));
   CHECK(scene.last("status")["level"] == 2);

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 
-namespace takt::ros2 {
+namespace takt::attach {
 
-/// Stamps of a run (CLOCK_MONOTONIC) as ROS 2 counts, since 1970. Equal stamps stay equal: the offset is that of the
-/// first call until the wall clock has moved by kStep_ns against it.
+/// Since 1970.
+inline int64_t wall_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+/// Stamps of a run (CLOCK_MONOTONIC) as other programs count, ROS 2 and Foxglove: since 1970. Equal stamps stay equal:
+/// the offset is that of the first call until the wall clock has moved by kStep_ns against it.
 class WallStamps {
  public:
   static constexpr int64_t kStep_ns = 1'000'000;
@@ -25,4 +32,4 @@ class WallStamps {
   bool known_ = false;
 };
 
-}  // namespace takt::ros2
+}  // namespace takt::attach
