@@ -127,6 +127,9 @@ void RungGraph::take_reservation(bool first, bool inherit) {
 }
 
 void RungGraph::run_node(size_t node, const GraphShape& shape) {
+  // One after the other: some libraries wake readers in the order in which they came, and where two branches begin that
+  // decides which of them has the second CPU.
+  while (board_->ready.load() < node && board_->stop.load() == 0) pause_ms(1);
   const std::unique_ptr<Ends> ends = medium_->open(node);
   const size_t sides = shape.sides(node).size();
   Bell bell(board_->bell);
