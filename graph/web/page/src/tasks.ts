@@ -36,7 +36,7 @@ export class Tasks {
   private readonly verb = h("select", { "aria-label": "What it is to do", change: () => this.choose() });
   private readonly rest = h("input", { type: "text", "aria-label": "Of what", maxlength: 190, autocomplete: "off" });
   private readonly reply = h("p", { class: "quiet", role: "status" });
-  private readonly said = h("p", { class: "words said", role: "status" });
+  private readonly said = h("p", { class: "words spoken", role: "status" });
   private readonly status = h("p", { class: "words" });
   private readonly plan = h("pre", { class: "words" });
   private readonly network = new NetworkPlan((spot) => this.pick(spot));

@@ -241,7 +241,7 @@ check(
     );
     await tasks.getByRole("button", { name: "table_1" }).click();
     assert.equal(await tasks.getByLabel("Of what").inputValue(), "table_1.");
-    await tasks.locator(".said", { hasText: "fetch the cup" }).waitFor();
+    await tasks.locator(".spoken", { hasText: "fetch the cup" }).waitFor();
     await tasks.getByLabel("What it is to do").selectOption("explore");
     assert.equal(await tasks.getByLabel("Of what").isVisible(), false);
     await tasks.getByRole("button", { name: "Hand over" }).click();
