@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+
+#include "nodes/cuda/stereo.cuh"
+#include "nodes/cuda/table.hpp"
+#include "rt/abi.hpp"
+
+namespace takt::cuda {
+namespace {
+
+void say(char* why, const char* text) { std::snprintf(why, kWhyBytes, "%s", text); }
+
+int32_t cards(char* why) {
+  int count = 0;
+  const cudaError_t error = cudaGetDeviceCount(&count);
+  if (error == cudaSuccess) return count;
+  say(why, cudaGetErrorString(error));
+  return -static_cast<int32_t>(error);
+}
+
+void card_name(int32_t card, char* name) {
+  cudaDeviceProp properties{};
+  say(name, cudaGetDeviceProperties(&properties, card) == cudaSuccess ? properties.name : "");
+}
+
+StereoOnCard* make_stereo(const StereoShape* shape, int32_t card, char* why) {
+  try {
+    return new StereoOnCard(*shape, card);
+  } catch (const std::exception& error) {
+    say(why, error.what());
+    return nullptr;
+  }
+}
+
+Outcome match(StereoOnCard* stereo, const StereoCall* call, int64_t bound_ns) { return stereo->match(*call, bound_ns); }
+void free_stereo(StereoOnCard* stereo) { delete stereo; }
+bool register_memory(void* memory, size_t bytes) { return registered().add(memory, bytes); }
+void forget_memory(void* memory) { registered().forget(memory); }
+
+}  // namespace
+}  // namespace takt::cuda
+
+extern "C" __attribute__((visibility("default"))) const takt::cuda::Table takt_cuda{
+    takt::kAbi,        takt::cuda::cards,       takt::cuda::card_name,       takt::cuda::make_stereo,
+    takt::cuda::match, takt::cuda::free_stereo, takt::cuda::register_memory, takt::cuda::forget_memory};
