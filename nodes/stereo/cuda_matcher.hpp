@@ -6,6 +6,7 @@
 
 #include "nodes/cuda/card.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::stereo {
 
@@ -31,8 +32,9 @@ class CudaMatcher final : public Matcher {
   const char* target() const override { return card_.name.c_str(); }
   /// Why the last match was made by the CPU; empty: it was not. As long as this lives.
   std::string_view trouble() const { return *trouble_; }
-  /// Whether the card matches noise faster than the twin: some matches of both.
-  bool is_quicker();
+  /// Whether the card matches noise faster than the twin, by that clock: some matches of both. In virtual time it does
+  /// not.
+  bool is_quicker(const Clock& clock);
 
  private:
   /// Whether the card made it.

@@ -42,7 +42,7 @@ class StereoNode final : public Node {
     if (pattern_ != BayerPattern::none) check_mosaic();
     range_ = most_ = disparities_;
     try {
-      matcher_ = full_matcher(parameters(disparities_));
+      matcher_ = full_matcher(setup.clock, parameters(disparities_));
       half_matcher_.emplace(width_, height_, channels_, parameters(disparities_));
       if (!calibration_().empty()) load_calibration(setup.directory / calibration_());
     } catch (const std::invalid_argument& error) {
@@ -116,9 +116,9 @@ class StereoNode final : public Node {
     return p;
   }
 
-  std::unique_ptr<Matcher> full_matcher(const MatcherParameters& p) {
+  std::unique_ptr<Matcher> full_matcher(const Clock& clock, const MatcherParameters& p) {
     if (accelerator_.word() != "none") {
-      auto on_card = card_matcher(p);
+      auto on_card = card_matcher(clock, p);
       card_matcher_ = on_card.get();
       if (on_card) return on_card;
     }
@@ -127,14 +127,14 @@ class StereoNode final : public Node {
   }
 
   /// Null: `auto` does without.
-  std::unique_ptr<CudaMatcher> card_matcher(const MatcherParameters& p) const {
+  std::unique_ptr<CudaMatcher> card_matcher(const Clock& clock, const MatcherParameters& p) const {
     const bool must = accelerator_.word() == "cuda";
     try {
       const auto card = cuda::find_card(0);
       if (!card) throw std::runtime_error(card.error());
       auto matcher = std::make_unique<CudaMatcher>(width_, height_, channels_, p, *card,
                                                    static_cast<int64_t>(accelerator_wait_ * 1e6));
-      if (must || matcher->is_quicker()) return matcher;
+      if (must || matcher->is_quicker(clock)) return matcher;
     } catch (const std::exception& error) {
       if (must) throw SetupError(std::string("accelerator is cuda, but ") + error.what());
     }

@@ -125,3 +125,21 @@ TEST_CASE("search and confidence change on both sides; what a card has no twin f
   CHECK_THROWS_AS(CardScene{mixed}, std::invalid_argument);
   CHECK(alive == 1);
 }
+
+TEST_CASE("the card is taken if it needs less time by the clock; one that has failed is not") {
+  struct Steps final : Clock {  // the card is asked first, five times
+    int64_t of_card_ns, of_twin_ns;
+    mutable int64_t at_ns = 0, readings = 0;
+    Steps(int64_t card, int64_t twin) : of_card_ns(card), of_twin_ns(twin) {}
+    int64_t now_ns() const override { return at_ns += readings++ < 10 ? of_card_ns : of_twin_ns; }
+    bool is_virtual() const override { return false; }
+  };
+  MatcherParameters p;
+  p.disparities = 16;
+  CardScene scene(p);
+  CHECK(scene.matcher.is_quicker(Steps(100, 200)));
+  CHECK_FALSE(scene.matcher.is_quicker(Steps(200, 100)));
+  CHECK_FALSE(scene.matcher.is_quicker(Steps(0, 0)));
+  next_outcome = cuda::Outcome::failed;
+  CHECK_FALSE(scene.matcher.is_quicker(Steps(100, 200)));
+}
