@@ -73,8 +73,9 @@ void search_windows(const Work& w, bool of_right, cudaStream_t stream) {
   const bool narrow = is_narrow(w.shape);
   const auto sum = [&](auto cost) {
     constexpr int kCost = decltype(cost)::value;
-    if (narrow) sum_columns<kCost, Narrow>(w, of_right, stream);
-    else sum_columns<kCost, Wide>(w, of_right, stream);
+    if constexpr (kCost == kGradient || kCost == kCensus)
+      if (narrow) return sum_columns<kCost, Narrow>(w, of_right, stream);
+    sum_columns<kCost, Wide>(w, of_right, stream);
   };
   switch (w.shape.cost) {
     case kGradient: sum(std::integral_constant<int, kGradient>()); break;
