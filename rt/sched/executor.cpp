@@ -191,7 +191,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   size_t begun = 0;
   const auto begin_lane = [&](size_t i) {
     const PassesPriorityOn at_once;
-    crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
+    crew_->workers.start([this, policy, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
       keep_rights(Rights::real_time);
       prefault_stack();
@@ -220,6 +220,8 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
         if (lane.next_release_ns() >= stop_.end_ns()) break;
         lane.run_next(clock_, stop_);
       }
+      // To end takes a thread longer than a short job takes: the last jobs of others need not wait for that.
+      if (policy == Policy::fixed) demote_thread(0);
     });
   };
   try {

@@ -69,9 +69,9 @@ Grant apply(const Reservation& reservation, int64_t patience_ns = kBandwidthMarg
 /// What a thread of this process has (0: the calling one), beside what it wanted.
 Grant read_back(const Reservation& wanted, int thread = 0);
 
-/// Puts another thread of this process behind all real-time ones (SCHED_OTHER), where it gets its share beside whatever
-/// else the machine does: behind that as well (SCHED_IDLE) a job could last for minutes, and so could the end of its
-/// process. False if the kernel refuses.
+/// Puts a thread of this process (0: the calling one) behind all real-time ones (SCHED_OTHER), where it gets its share
+/// beside whatever else the machine does: behind that as well (SCHED_IDLE) a job could last for minutes, and so could
+/// the end of its process. False if the kernel refuses.
 bool demote_thread(int thread);
 /// Lets another thread of this process run before all of the default policy (SCHED_FIFO of that priority). False if the
 /// kernel refuses.

@@ -39,6 +39,19 @@ struct Spinner final : Node {
   }
 };
 
+/// Notes the policy under which the thread that ran its jobs comes to its end.
+struct EndsUnder final : Node {
+  static inline std::atomic<int> policy{-1};
+  void setup(Setup&) override {}
+  void run(Job&) override {
+    struct AtEnd {
+      ~AtEnd() { policy.store(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK); }
+    };
+    thread_local const AtEnd at_end;
+    (void)&at_end;
+  }
+};
+
 struct SpinnerScene {
   Steady steady;
   Spinner spinner;
@@ -128,6 +141,19 @@ TEST_CASE("under fixed a job that does not return is demoted, and the run goes o
   CHECK(scene.board->task(0).completed.load() + scene.board->task(0).skipped.load() == 15);
   CHECK(scene.board->task(0).demoted.load() == 0);
   MESSAGE("demoted with " << scene.board->task(1).enforcement_error_ns.load() / 1000 << " us beyond its budget");
+}
+
+TEST_CASE("under fixed a worker that is through with its jobs ends behind those of others") {
+  SpinnerScene& scene = new_scene(Policy::fixed);
+  EndsUnder node;
+  scene.plan.tasks[1].node = &node;
+  const RunResult result = scene.run(300 * kMs);
+  if (result.policy_granted != Policy::fixed) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
+  CHECK(result.stuck.empty());
+  CHECK(EndsUnder::policy.load() == SCHED_OTHER);
 }
 
 TEST_CASE("under fixed a high node that does not return is demoted, named, and safe_stop entered") {
