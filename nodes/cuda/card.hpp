@@ -18,6 +18,12 @@ struct Card {
   std::string name;  ///< "NVIDIA H200"
 };
 
+/// A card, and how long a job may wait for it.
+struct CardUse {
+  Card card;
+  int64_t bound_ns = 0;
+};
+
 /// Loads the plug-in and CUDA's driver with the first call: some 0.2 s, memory and threads of their own. Error: what of
 /// plug-in, driver and card is missing, and how to get it. Any thread.
 tl::expected<Card, std::string> find_card(int index);

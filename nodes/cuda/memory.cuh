@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -98,6 +99,19 @@ class Registered {
 inline Registered& registered() {
   static Registered all;
   return all;
+}
+
+struct ImageOnCard {
+  const uint8_t* pixels;
+  ptrdiff_t stride;  ///< bytes
+};
+/// Where the card reads an image of the host, `row` bytes in each of its rows: where it lies, if its pages are
+/// registered, else in `staged`, which both see and to which the CPU copies it row after row.
+inline ImageOnCard seen_by_card(const ImageOnCard& image, size_t row, int rows, uint8_t* staged) {
+  if (const void* there = registered().on_card(image.pixels)) return {static_cast<const uint8_t*>(there), image.stride};
+  for (int y = 0; y < rows; ++y)
+    std::memcpy(staged + static_cast<size_t>(y) * row, image.pixels + y * image.stride, row);
+  return {staged, static_cast<ptrdiff_t>(row)};
 }
 
 }  // namespace takt::cuda

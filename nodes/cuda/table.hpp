@@ -41,9 +41,43 @@ enum class Outcome : int32_t {
   failed  ///< CUDA says so, or it stands still while it writes: the card is not asked again
 };
 
-struct StereoOnCard;
+/// An object of a co-occurrence stage (nodes/object_detection): the histograms of its views over the colours that any
+/// of them has.
+struct CooccurrenceObject {
+  int32_t colours, views;
+  const uint8_t* colour_of_slot;  ///< rising
+  const uint32_t* rows;           ///< of a view, in the order of pair_bin() of its slots
+  ptrdiff_t row_stride;
+};
+struct CooccurrenceShape {
+  int32_t width, height;  ///< of images with three channels
+  int32_t side;           ///< of a window, px
+  int32_t colours, distances;
+  int32_t windows;  ///< most in a call, each with all objects
+  int32_t objects;
+  const CooccurrenceObject* of_object;
+};
+struct CardWindow {
+  int32_t x, y;
+};
+struct CardQuestion {
+  int32_t window, object;
+};
+struct CooccurrenceCall {
+  const uint8_t* bgr;
+  ptrdiff_t stride;
+  const CardWindow* windows;
+  int32_t windows_count;
+  const CardQuestion* questions;
+  int32_t questions_count;
+  uint32_t* missing;  ///< questions x most views of an object
+};
 
-/// Functions of a StereoOnCard: one thread at a time. All others: any thread. `why` has kWhyBytes.
+struct StereoOnCard;
+struct CooccurrencesOnCard;
+
+/// Functions of one StereoOnCard or CooccurrencesOnCard: one thread at a time. All others: any thread. `why` has
+/// kWhyBytes.
 struct Table {
   const char* abi;  ///< kAbi of the plug-in (load_component)
   /// How many cards there are; negative: CUDA's error, in words in `why`.
@@ -55,6 +89,10 @@ struct Table {
   /// driver may block.
   Outcome (*match)(StereoOnCard* stereo, const StereoCall* call, int64_t bound_ns);
   void (*free_stereo)(StereoOnCard* stereo);
+  /// As the three above.
+  CooccurrencesOnCard* (*make_cooccurrences)(const CooccurrenceShape* shape, int32_t card, char* why);
+  Outcome (*find_missing)(CooccurrencesOnCard* cooccurrences, const CooccurrenceCall* call, int64_t bound_ns);
+  void (*free_cooccurrences)(CooccurrencesOnCard* cooccurrences);
   /// Pages that cards may read and write from now on. False: CUDA refuses.
   bool (*register_memory)(void* memory, size_t bytes);
   void (*forget_memory)(void* memory);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/object_detection/colour_bins.hpp"
 
-#include <algorithm>
-
 #include "nodes/stereo/simd_targets.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -37,11 +35,11 @@ HWY_INLINE Shorts quotient(int factor, Shorts n, Shorts d) {
                      half_quotient(f, hn::LowerHalf(kHalf, n), hn::LowerHalf(kHalf, d)));
 }
 
-/// Whole numbers: hue / spread is the position on the colour circle in sixths of a turn, spread / high the saturation.
-struct Hsv {
+/// As Hsv.
+struct HsvOfMany {
   Shorts hue, spread, high;
 
-  HWY_INLINE explicit Hsv(const uint8_t* bgr) {
+  HWY_INLINE explicit HsvOfMany(const uint8_t* bgr) {
     hn::Vec<decltype(kBytes)> b8, g8, r8;
     hn::LoadInterleaved3(kBytes, bgr, b8, g8, r8);
     const auto b = hn::PromoteTo(kShorts, b8), g = hn::PromoteTo(kShorts, g8), r = hn::PromoteTo(kShorts, r8);
@@ -63,7 +61,7 @@ size_t Bins(const uint8_t* bgr, size_t count, BinSplit split, uint16_t* index) {
              values = number(split.value);
   size_t x = 0;
   for (; x + hn::Lanes(kShorts) <= count; x += hn::Lanes(kShorts)) {
-    const Hsv c(bgr + 3 * x);
+    const HsvOfMany c(bgr + 3 * x);
     const auto s = hn::Min(last_saturation, quotient(split.saturation, c.spread, hn::Max(c.high, number(1))));
     const auto v = hn::ShiftRight<8>(hn::Mul(c.high, values));
     const auto bin = hn::Add(hn::Mul(hn::Add(hn::Mul(c.hue_part(split.hue), hue_step), s), values), v);
@@ -77,7 +75,7 @@ size_t PairColours(const uint8_t* bgr, size_t count, PairColourSplit split, uint
              first_hue = number(split.first_hue);
   size_t x = 0;
   for (; x + hn::Lanes(kShorts) <= count; x += hn::Lanes(kShorts)) {
-    const Hsv c(bgr + 3 * x);
+    const HsvOfMany c(bgr + 3 * x);
     const auto from = [&](int value) HWY_ATTR { return hn::Gt(c.high, number(value - 1)); };
     const auto grey = hn::Add(
         one, hn::Add(hn::IfThenElseZero(from(split.mid_from), one), hn::IfThenElseZero(from(split.bright_from), one)));
@@ -98,38 +96,12 @@ namespace takt::object_detection {
 HWY_EXPORT(Bins);
 HWY_EXPORT(PairColours);
 
-namespace {
-
-/// As Hsv.
-struct Colour {
-  int hue, spread, high;
-
-  Colour(int b, int g, int r) {
-    high = std::max({b, g, r});
-    spread = high - std::min({b, g, r});
-    hue = high == r ? g - b : high == g ? 2 * spread + b - r : 4 * spread + r - g;
-    if (hue < 0) hue += 6 * spread;
-  }
-  int hue_part(int parts) const { return spread == 0 ? 0 : parts * hue / (6 * spread); }
-};
-
-}  // namespace
-
 uint16_t colour_bin(uint8_t blue, uint8_t green, uint8_t red, ColourBins bins) {
   const BinSplit split = split_of(bins);
-  const Colour c(blue, green, red);
+  const Hsv c(blue, green, red);
   const int s = c.high == 0 ? 0 : std::min(split.saturation - 1, split.saturation * c.spread / c.high);
   const int v = split.value * c.high / 256;
   return static_cast<uint16_t>((c.hue_part(split.hue) * split.saturation + s) * split.value + v);
-}
-
-uint8_t pair_colour(uint8_t blue, uint8_t green, uint8_t red, int colours) {
-  const PairColourSplit split = pair_split_of(colours);
-  const Colour c(blue, green, red);
-  if (c.high < split.black_below) return 0;
-  if (20 * c.spread < split.grey_below * c.high)
-    return static_cast<uint8_t>(1 + (c.high >= split.mid_from) + (c.high >= split.bright_from));
-  return static_cast<uint8_t>(split.first_hue + c.hue_part(split.hues));
 }
 
 void colour_bins(const uint8_t* bgr, size_t count, ColourBins bins, uint16_t* index) {

@@ -2,6 +2,7 @@
 // Image preparation of the stages that look at colour: each pixel's indices I_ch (R-6.1, bins after
 // C-7) and I_cch.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -19,6 +20,19 @@ constexpr BinSplit split_of(ColourBins bins) {
   constexpr BinSplit kSplits[] = {{64, 32, 2}, {64, 64, 1}, {32, 32, 1}, {16, 16, 1}, {8, 4, 1}};
   return kSplits[static_cast<size_t>(bins)];
 }
+
+/// Whole numbers: hue / spread is the position on the colour circle in sixths of a turn, spread / high the saturation.
+struct Hsv {
+  int hue, spread, high;
+
+  constexpr Hsv(int b, int g, int r) : hue(0), spread(0), high(std::max(b, std::max(g, r))) {
+    spread = high - std::min(b, std::min(g, r));
+    hue = high == r ? g - b : high == g ? 2 * spread + b - r : 4 * spread + r - g;
+    if (hue < 0) hue += 6 * spread;
+  }
+  /// floor(`parts` hue / turn)
+  constexpr int hue_part(int parts) const { return spread == 0 ? 0 : parts * hue / (6 * spread); }
+};
 
 /// Index (h * nS + s) * nV + v of one colour, in exact integers: h = floor(nH H / 360 degrees), s = floor(nS S) (S = 1
 /// belongs to the last bin), v = floor(nV V / 256). Grey has H = 0, black S = 0.
@@ -41,7 +55,14 @@ constexpr PairColourSplit pair_split_of(int colours) {
   return colours == 20 ? PairColourSplit{39, 3, 115, 204, 4, 16} : PairColourSplit{51, 4, kNever, kNever, 2, 3};
 }
 /// Index of one colour among them.
-uint8_t pair_colour(uint8_t blue, uint8_t green, uint8_t red, int colours);
+constexpr uint8_t pair_colour(uint8_t blue, uint8_t green, uint8_t red, int colours) {
+  const PairColourSplit split = pair_split_of(colours);
+  const Hsv c(blue, green, red);
+  if (c.high < split.black_below) return 0;
+  if (20 * c.spread < split.grey_below * c.high)
+    return static_cast<uint8_t>(1 + (c.high >= split.mid_from) + (c.high >= split.bright_from));
+  return static_cast<uint8_t>(split.first_hue + c.hue_part(split.hues));
+}
 
 /// The same for `count` interleaved BGR pixels, vectorised; equal to pair_colour for every colour.
 void pair_colours(const uint8_t* bgr, size_t count, int colours, uint8_t* index);

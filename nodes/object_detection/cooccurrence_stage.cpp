@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "nodes/cuda/quicker.hpp"
 #include "nodes/object_detection/histogram_kernels.hpp"
 
 namespace takt::object_detection {
@@ -21,7 +22,7 @@ CooccurrenceStage::CooccurrenceStage(const SearchGrid& grid, const PairBins& bin
   missing_.resize(most);
 }
 
-CooccurrenceStage::References CooccurrenceStage::gather(const std::vector<Histogram>& views) const {
+PairReferences CooccurrenceStage::gather(const std::vector<Histogram>& views) const {
   const auto bin = [&](int a, int b, int k) {
     return pair_bin(std::min(a, b), std::max(a, b), k, bins_.colours, bins_.distances);
   };
@@ -32,15 +33,13 @@ CooccurrenceStage::References CooccurrenceStage::gather(const std::vector<Histog
           if (view.count[bin(a, b, k)] > 0) return true;
     return false;
   };
-  References references;
-  std::vector<int> used;
+  PairReferences references;
+  std::vector<uint8_t>& used = references.colour_of_slot;
   for (int a = 0; a < bins_.colours; ++a)
-    if (has(a)) used.push_back(a);
-  references.colours = static_cast<int>(used.size());
+    if (has(a)) used.push_back(static_cast<uint8_t>(a));
   references.slot_of_colour.assign(static_cast<size_t>(bins_.colours), static_cast<uint8_t>(used.size()));
-  for (size_t slot = 0; slot < used.size(); ++slot)
-    references.slot_of_colour[static_cast<size_t>(used[slot])] = static_cast<uint8_t>(slot);
-  references.bins = (pair_bins(references.colours, bins_.distances) + kLaneBlock - 1) / kLaneBlock * kLaneBlock;
+  for (size_t slot = 0; slot < used.size(); ++slot) references.slot_of_colour[used[slot]] = static_cast<uint8_t>(slot);
+  references.bins = (pair_bins(references.colours(), bins_.distances) + kLaneBlock - 1) / kLaneBlock * kLaneBlock;
   references.count = views.size();
   for (const Histogram& view : views) {
     std::vector<uint32_t> row;
@@ -53,8 +52,38 @@ CooccurrenceStage::References CooccurrenceStage::gather(const std::vector<Histog
   return references;
 }
 
+void CooccurrenceStage::use(const cuda::CardUse& card) {
+  card_ = std::make_unique<CudaCooccurrences>(grid_, bins_, objects_, card);
+}
+
+void CooccurrenceStage::count_ahead(ImageView<const uint8_t> bgr, std::span<const WindowOfObject> questions) {
+  if (card_) (void)card_->find(bgr, questions);  // what it does not find, missing() counts
+}
+
+bool CooccurrenceStage::card_is_quicker(const Clock& clock) {
+  constexpr size_t kTried = 8;  // about as many as the first two stages leave
+  const std::vector<uint8_t> pixels =
+      cuda::noise(size_t{3} * static_cast<size_t>(grid_.image_width) * static_cast<size_t>(grid_.image_height));
+  const ImageView<const uint8_t> image(pixels.data(), grid_.image_width, grid_.image_height, 3);
+  std::vector<WindowOfObject> questions;
+  const auto windows = static_cast<size_t>(grid_.windows());
+  for (size_t i = 0; i < std::min(kTried, windows); ++i)
+    questions.push_back({i * windows / std::min(kTried, windows), i % objects_.size()});
+  return cuda::is_quicker(
+      clock, [&] { return card_->find(image, questions); },
+      [&] {
+        for (const WindowOfObject& question : questions) count(image, question.window, question.object);
+      });
+}
+
 std::span<const uint32_t> CooccurrenceStage::missing(ImageView<const uint8_t> bgr, size_t window, size_t object) {
-  const References& references = objects_[object];
+  if (card_)
+    if (const auto known = card_->missing(window, object); !known.empty()) return known;
+  return count(bgr, window, object);
+}
+
+std::span<const uint32_t> CooccurrenceStage::count(ImageView<const uint8_t> bgr, size_t window, size_t object) {
+  const PairReferences& references = objects_[object];
   const auto u = static_cast<int>(window) % grid_.columns, v = static_cast<int>(window) / grid_.columns;
   const auto side = static_cast<size_t>(grid_.window_px);
   for (size_t y = 0; y < side; ++y) {
@@ -62,7 +91,7 @@ std::span<const uint32_t> CooccurrenceStage::missing(ImageView<const uint8_t> bg
     pair_colours(&bgr.at(grid_.x0(u), grid_.y0(v) + static_cast<int>(y)), side, bins_.colours, row);
     for (size_t x = 0; x < side; ++x) row[x] = references.slot_of_colour[row[x]];
   }
-  counter_.count(colours_.data(), references.colours, count_.data());
+  counter_.count(colours_.data(), references.colours(), count_.data());
   missing_masses(count_.data(), references.rows.data(), references.bins, references.count, missing_.data());
   return std::span(missing_).first(references.count);
 }

@@ -2,6 +2,7 @@
 #include "nodes/object_detection/detector.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "nodes/object_detection/layout_learning.hpp"
 
@@ -34,6 +35,7 @@ Detector::Detector(int image_width, int image_height, std::span<const DatabaseOb
     windows_ += undecided_.back().size();
   }
   if (last_ >= Stage::cooccurrence) candidates_.reserve(windows_ * database.size());
+  if (last_ >= Stage::cooccurrence) at_one_scale_.reserve(windows_ * database.size());
   for (size_t entry = 0; entry < database.size(); ++entry) class_ids_.push_back(static_cast<float>(entry));
   for (const DatabaseObject& object : database)
     first_of_name_.push_back(static_cast<size_t>(
@@ -74,6 +76,40 @@ void Detector::gather_candidates() {
     }
   }
   std::make_heap(candidates_.begin(), candidates_.end(), Candidate::worse);
+}
+
+/// All of them, though there may not be time for all: a card takes not much longer for more.
+void Detector::announce_candidates() {
+  for (uint32_t s = 0; s < scales_.size(); ++s) {
+    at_one_scale_.clear();
+    for (const Candidate& candidate : candidates_)
+      if (candidate.scale == s) at_one_scale_.push_back({candidate.window, candidate.object});
+    if (!at_one_scale_.empty()) scales_[s].will_decide(at_one_scale_);
+  }
+}
+
+void Detector::use(const cuda::CardUse& card) {
+  for (ScaleSearch& scale : scales_) {
+    if (scale.cooccurrence() == nullptr)
+      throw std::invalid_argument(
+          "object_detection: a card has the stage of co-occurrences, which `stages` leaves out");
+    scale.cooccurrence()->use(card);
+  }
+}
+
+void Detector::leave_card(const std::string& why) {
+  refused_ = why;
+  for (ScaleSearch& scale : scales_)
+    if (scale.cooccurrence() != nullptr) scale.cooccurrence()->leave_card();
+}
+
+bool Detector::card_is_quicker(const Clock& clock) { return scales_[0].cooccurrence()->card_is_quicker(clock); }
+
+std::string_view Detector::trouble() {
+  for (ScaleSearch& scale : scales_)
+    if (scale.cooccurrence() != nullptr && !scale.cooccurrence()->trouble().empty())
+      return scale.cooccurrence()->trouble();
+  return refused_;
 }
 
 void Detector::decide_best_candidate() {

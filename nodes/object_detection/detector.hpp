@@ -2,6 +2,8 @@
 #pragma once
 #include <algorithm>
 #include <span>
+#include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -49,7 +51,10 @@ class Detector {
     if (!begin(bgr, mask)) return false;
     while (searched_rows_ < rows_.size() && another_row()) search_row();
     gather_candidates();
-    while (!candidates_.empty() && another_window()) decide_best_candidate();
+    for (bool first = true; !candidates_.empty() && another_window(); first = false) {
+      if (first) announce_candidates();
+      decide_best_candidate();
+    }
     end();
     return true;
   }
@@ -70,6 +75,16 @@ class Detector {
   size_t detections(double min_score, std::span<Detection> out);
   /// Of grid(): 255 where a window passes, or its middle lies in one that passes at another scale, else 0.
   void region_of_interest(ImageView<uint8_t> roi) const;
+
+  /// From now on a card counts co-occurrences, of all windows that need it at once. Takes 0.2 s a scale. Throws
+  /// std::runtime_error if the card refuses, std::invalid_argument without that stage.
+  void use(const cuda::CardUse& card);
+  /// The CPU counts again. `why`: what trouble() says from now on.
+  void leave_card(const std::string& why);
+  /// Whether the card counts faster in some windows of noise than the CPU, by that clock.
+  bool card_is_quicker(const Clock& clock);
+  /// Why the CPU counts in place of the card; empty: it does not. As long as this lives.
+  std::string_view trouble();
   void remember(StateArchive& archive) { TAKT_STATE(archive, first_row_); }
 
  private:
@@ -92,6 +107,7 @@ class Detector {
   bool begin(ImageView<const uint8_t> bgr, const MaskSums* mask);
   void search_row();
   void gather_candidates();
+  void announce_candidates();
   void decide_best_candidate();
   void end();
 
@@ -105,6 +121,8 @@ class Detector {
   const MaskSums* mask_ = nullptr;
   size_t first_row_ = 0, searched_rows_ = 0, searched_windows_ = 0;
   std::vector<Candidate> candidates_;            ///< a heap, the best in front
+  std::vector<WindowOfObject> at_one_scale_;     ///< of these
+  std::string refused_;                          ///< why there is no card
   std::vector<std::vector<uint8_t>> undecided_;  ///< by scale: windows that were candidates to the end
   std::vector<size_t> first_of_name_;            ///< of each entry: the first of the same object
   std::vector<float> class_ids_;                 ///< of each entry

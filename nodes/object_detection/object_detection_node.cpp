@@ -5,8 +5,11 @@
 #include <memory>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
+#include "nodes/cuda/accelerator.hpp"
 #include "nodes/object_detection/reloader.hpp"
 #include "nodes/object_detection/revisions.hpp"
 #include "rt/msg/ace/detections.hpp"
@@ -44,13 +47,16 @@ class ObjectDetectionNode final : public Node {
       const auto database = read_database(folder, reference_, TestViews::skip);
       const auto backgrounds = read_backgrounds(folder);
       detector_ = make(database, backgrounds);
-      build_ = [make, folder, database, backgrounds, known = ClassIds(database),
+      const auto card = accelerator_.take([&](const cuda::CardUse& use) { detector_->use(use); },
+                                          [&] { return detector_->card_is_quicker(setup.clock); });
+      if (!card) detector_->leave_card("");
+      build_ = [make, folder, database, backgrounds, known = ClassIds(database), card,
                 side_px = reference_()](const std::string& revision) mutable {
-        if (revision.empty()) return make(database, backgrounds);
+        if (revision.empty()) return on_card(card, make(database, backgrounds));
         const auto changed = read_revision(folder, revision, side_px);
         auto detector = make(changed, read_backgrounds(revision_folder(folder, revision)));
         detector->set_class_ids(known.of(changed));
-        return detector;
+        return on_card(card, std::move(detector));
       };
     } catch (const DatabaseError& error) {
       throw SetupError(error.what());
@@ -76,6 +82,7 @@ class ObjectDetectionNode final : public Node {
     const auto time_left_ns = [&] { return job.time_left_ns(); };
     if (!detector_->run_within(pair->left_view(), take_mask(), time_left_ns, static_cast<int64_t>(reserve_() * 1e9)))
       return job.no_result();
+    accelerator_.tell(job, "counts co-occurrences", detector_->trouble());
     Detections* found = detections_.connected() ? detections_.loan() : nullptr;
     if (found != nullptr) {
       found->image_width = pair->width;
@@ -105,6 +112,18 @@ class ObjectDetectionNode final : public Node {
   }
 
  private:
+  /// A card may have less memory left than at the start.
+  static std::unique_ptr<Detector> on_card(const std::optional<cuda::CardUse>& card,
+                                           std::unique_ptr<Detector> detector) {
+    if (!card) return detector;
+    try {
+      detector->use(*card);
+    } catch (const std::runtime_error& error) {
+      detector->leave_card(error.what());
+    }
+    return detector;
+  }
+
   /// Detector and class ids are those that all revisions so far lead to. False: one of them cannot be read any more.
   bool take_up_again() {
     try {
@@ -208,6 +227,8 @@ class ObjectDetectionNode final : public Node {
   Param<double> reserve_{this,       "reserve", 0.001,
                          {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};
   Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept", kSizesMemory};
+
+  cuda::Accelerator accelerator_{this};
 
   std::function<std::unique_ptr<Detector>(const std::string&)> build_;
   std::unique_ptr<Detector> detector_;

@@ -19,8 +19,8 @@ struct DetectorParameters {
   int orientations = 360;
   PairBins pairs;
   int window_px = 64;
-  /// Size, of its views' edge, down to which an object is found, 0.5 .. 1: views are compared with at that size. What is
-  /// larger only has more of everything, and that costs nothing.
+  /// Size, of its views' edge, down to which an object is found, 0.5 .. 1: views are compared with at that size. What
+  /// is larger only has more of everything, and that costs nothing.
   double smallest = 0.7;
   double tolerance = 0.4;      ///< share of an object that may be hidden, in automatic thresholds
   double threshold_scale = 1;  ///< factor on every threshold

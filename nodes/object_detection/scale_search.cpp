@@ -82,6 +82,10 @@ void ScaleSearch::search_row() {
   }
 }
 
+void ScaleSearch::will_decide(std::span<const WindowOfObject> windows) {
+  if (cooccurrence_) cooccurrence_->count_ahead(image_, windows);
+}
+
 void ScaleSearch::decide(size_t object, size_t window) {
   const float error = limits_[2].error(object, cooccurrence_->missing(image_, window, object).data());
   if (!layout_ || error == kFailed) return decision_.set(object, window, error);

@@ -43,6 +43,12 @@ class ScaleSearch {
   void search_row();
   /// A window that passed these for the object through the rest.
   void decide(size_t object, size_t window);
+  /// What decide() will be called for in this image, so that a card may do what it has a twin for at once. In any
+  /// order, each at most once.
+  void will_decide(std::span<const WindowOfObject> windows);
+
+  /// The stage of co-occurrences, which has a twin on a card; null without it.
+  CooccurrenceStage* cooccurrence() { return cooccurrence_ ? &*cooccurrence_ : nullptr; }
 
  private:
   std::optional<Shrinker> shrinker_;  ///< none at full size

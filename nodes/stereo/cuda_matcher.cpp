@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
+#include "nodes/cuda/quicker.hpp"
 #include "nodes/stereo/post_process.hpp"
 #include "nodes/stereo/semi_global_matcher.hpp"
 #include "nodes/stereo/window_matcher.hpp"
@@ -25,20 +25,34 @@ int32_t number_of(CostKind cost) {
 
 }  // namespace
 
+cuda::StereoShape card_shape(int width, int height, int channels, const MatcherParameters& p) {
+  return {width,
+          height,
+          channels,
+          p.disparities,
+          number_of(p.cost),
+          p.truncation(),
+          p.n_square,
+          p.n_min,
+          p.uniqueness,
+          p.subpixel,
+          p.median,
+          p.left_right_check,
+          p.selection == Selection::semi_global};
+}
+
 bool CudaMatcher::serves(const MatcherParameters& p) {
   return WindowMatcher::serves(p) || SemiGlobalMatcher::serves(p);
 }
 
 CudaMatcher::CudaMatcher(int width, int height, int channels, const MatcherParameters& parameters,
-                         const cuda::Card& card, int64_t bound_ns)
-    : card_(card),
-      bound_ns_(bound_ns),
+                         const cuda::CardUse& use)
+    : use_(use),
       width_(width),
       height_(height),
       channels_(channels),
       twin_(make_matcher(width, height, channels, parameters)),
-      late_(card.name + " was later than " + std::to_string(bound_ns / 1000) + " us"),
-      failed_(card.name + " has failed, and is not asked again"),
+      trust_(use.card.name, use.bound_ns),
       disparities_(parameters.disparities),
       most_disparities_(parameters.disparities),
       min_confidence_(parameters.min_confidence),
@@ -48,25 +62,13 @@ CudaMatcher::CudaMatcher(int width, int height, int channels, const MatcherParam
     throw std::invalid_argument(
         "stereo: a card has square windows with winner takes all, of the costs gradient, ssd, sad and census, and "
         "semi_global of census with n_square 1");
-  const cuda::StereoShape shape{width,
-                                height,
-                                channels,
-                                parameters.disparities,
-                                number_of(parameters.cost),
-                                parameters.truncation(),
-                                parameters.n_square,
-                                parameters.n_min,
-                                parameters.uniqueness,
-                                parameters.subpixel,
-                                parameters.median,
-                                parameters.left_right_check,
-                                parameters.selection == Selection::semi_global};
+  const cuda::StereoShape shape = card_shape(width, height, channels, parameters);
   std::array<char, cuda::kWhyBytes> why{};
-  stereo_ = card.cuda->make_stereo(&shape, card.index, why.data());
-  if (stereo_ == nullptr) throw std::runtime_error(card.name + ": " + why.data());
+  stereo_ = use.card.cuda->make_stereo(&shape, use.card.index, why.data());
+  if (stereo_ == nullptr) throw std::runtime_error(use.card.name + ": " + why.data());
 }
 
-CudaMatcher::~CudaMatcher() { card_.cuda->free_stereo(stereo_); }
+CudaMatcher::~CudaMatcher() { use_.card.cuda->free_stereo(stereo_); }
 
 void CudaMatcher::limit_search(int disparities) {
   disparities_ = std::clamp(disparities, 1, most_disparities_);
@@ -83,31 +85,19 @@ void CudaMatcher::tune(const MatcherParameters& parameters) {
 void CudaMatcher::want_rows(int first, int last) { twin_->want_rows(first, last); }
 
 bool CudaMatcher::is_quicker(const Clock& clock) {
-  constexpr int kTimes = 5;
   const auto pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
-  std::vector<uint8_t> image(pixels * static_cast<size_t>(channels_));
-  uint32_t state = 1;
-  for (uint8_t& level : image) level = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
+  const std::vector<uint8_t> image = cuda::noise(pixels * static_cast<size_t>(channels_));
   std::vector<int16_t> disparity(pixels);
   std::vector<uint8_t> confidence(pixels);
   const DisparityViews out{{disparity.data(), width_, height_}, {confidence.data(), width_, height_}};
-  const auto shortest = [&](auto&& match) {
-    int64_t best = std::numeric_limits<int64_t>::max();
-    for (int i = 0; i < kTimes; ++i) {
-      const int64_t begun_ns = clock.now_ns();
-      if (!match(ImageView<const uint8_t>(image.data(), width_, height_, channels_))) break;
-      best = std::min(best, clock.now_ns() - begun_ns);
-    }
-    return best;
-  };
-  const auto card = shortest([&](auto view) { return match_on_card(view, view, out); });
-  return card < shortest([&](auto view) { return twin_->match(view, view, out); });
+  const ImageView<const uint8_t> view(image.data(), width_, height_, channels_);
+  return cuda::is_quicker(
+      clock, [&] { return match_on_card(view, view, out); }, [&] { (void)twin_->match(view, view, out); });
 }
 
 bool CudaMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const DisparityViews& out) {
   if (!fit(left, right, out, width_, height_, channels_)) return false;
-  if (!given_up_ && pause_ == 0 && match_on_card(left, right, out)) return true;
-  if (pause_ > 0) --pause_;
+  if (trust_.asks() && match_on_card(left, right, out)) return true;
   return twin_->match(left, right, out);
 }
 
@@ -118,23 +108,7 @@ bool CudaMatcher::match_on_card(ImageView<const uint8_t> left, ImageView<const u
                               out.fraction.data,   out.disparity.stride, out.confidence.stride,
                               out.fraction.stride, disparities_,         min_confidence_,
                               step_once_,          step_twice_};
-  switch (card_.cuda->match(stereo_, &call, bound_ns_)) {
-    case cuda::Outcome::done:
-      late_in_row_ = 0;
-      trouble_ = &none_;
-      return true;
-    case cuda::Outcome::late:
-      trouble_ = &late_;
-      if (++late_in_row_ >= kMostLate) {
-        late_in_row_ = 0;
-        pause_ = kPause;
-      }
-      return false;
-    case cuda::Outcome::failed: break;
-  }
-  trouble_ = &failed_;
-  given_up_ = true;
-  return false;
+  return trust_.done(use_.card.cuda->match(stereo_, &call, use_.bound_ns));
 }
 
 }  // namespace takt::stereo

@@ -92,15 +92,15 @@ std::optional<std::string> problem(const MatcherParameters& p, int width, int he
 MatcherParameters tuned(const MatcherParameters& made, const MatcherParameters& wanted);
 
 /// Confidence 0..255 of a window sum (thesis Eq. 3.6, corrected): zeta = (c_max N^2 - sum) / (c_max N^2), rounded.
-inline uint8_t confidence_of(int sum, int max_sum) {
+constexpr uint8_t confidence_of(int sum, int max_sum) {
   return static_cast<uint8_t>((int64_t{255} * (max_sum - sum) + max_sum / 2) / max_sum);
 }
 
 /// Grey value of a BGR pixel: ITU-R BT.601 weights in 1/256.
-inline uint8_t grey_of(int b, int g, int r) { return static_cast<uint8_t>((29 * b + 150 * g + 77 * r + 128) >> 8); }
+constexpr uint8_t grey_of(int b, int g, int r) { return static_cast<uint8_t>((29 * b + 150 * g + 77 * r + 128) >> 8); }
 
 /// Twice the derivative of a grey image, from the two neighbours of a pixel, saturated to -128..127.
-inline int8_t twice_derivative(int before, int after) {
+constexpr int8_t twice_derivative(int before, int after) {
   return static_cast<int8_t>(std::clamp(after - before, -128, 127));
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "nodes/cuda/accelerator.hpp"
 #include "nodes/stereo/band_matcher.hpp"
 #include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/cuda_matcher.hpp"
@@ -117,36 +118,14 @@ class StereoNode final : public Node {
   }
 
   std::unique_ptr<Matcher> full_matcher(const Clock& clock, const MatcherParameters& p) {
-    if (accelerator_.word() != "none") {
-      auto on_card = card_matcher(clock, p);
-      card_matcher_ = on_card.get();
-      if (on_card) return on_card;
-    }
+    std::unique_ptr<CudaMatcher> on_card;
+    const auto in_use = accelerator_.take(
+        [&](const cuda::CardUse& use) { on_card = std::make_unique<CudaMatcher>(width_, height_, channels_, p, use); },
+        [&] { return on_card->is_quicker(clock); });
+    card_matcher_ = in_use ? on_card.get() : nullptr;
+    if (in_use) return on_card;
     if (bands_ > 1) return std::make_unique<BandMatcher>(width_, height_, channels_, p, bands_);
     return make_matcher(width_, height_, channels_, p);
-  }
-
-  /// Null: `auto` does without.
-  std::unique_ptr<CudaMatcher> card_matcher(const Clock& clock, const MatcherParameters& p) const {
-    const bool must = accelerator_.word() == "cuda";
-    try {
-      const auto card = cuda::find_card(0);
-      if (!card) throw std::runtime_error(card.error());
-      auto matcher = std::make_unique<CudaMatcher>(width_, height_, channels_, p, *card,
-                                                   static_cast<int64_t>(accelerator_wait_ * 1e6));
-      if (must || matcher->is_quicker(clock)) return matcher;
-    } catch (const std::exception& error) {
-      if (must) throw SetupError(std::string("accelerator is cuda, but ") + error.what());
-    }
-    return nullptr;
-  }
-
-  void tell_of_card(Job& job) {
-    if (card_matcher_ == nullptr || job.level() != 0 || card_matcher_->trouble() == told_of_card_) return;
-    told_of_card_ = card_matcher_->trouble();
-    if (told_of_card_.empty()) job.log(LogLevel::info, "%s matches again", card_matcher_->target());
-    else
-      job.log(LogLevel::warning, "the CPU matches: %.*s", static_cast<int>(told_of_card_.size()), told_of_card_.data());
   }
 
   void check_mosaic() {
@@ -240,7 +219,7 @@ class StereoNode final : public Node {
     }
     Matcher& matcher = job.level() == 0 ? *matcher_ : *half_matcher_;
     if (!matcher.match(left, right, views)) return job.no_result();
-    tell_of_card(job);
+    if (card_matcher_ != nullptr && job.level() == 0) accelerator_.tell(job, "matches", card_matcher_->trouble());
     if (map != nullptr) disparity_.send(stamp_);
     if (row_check_) check_rows(job, left, right, views.disparity);
     PointCloud* cloud = cloud_.connected() ? cloud_.loan() : nullptr;
@@ -348,19 +327,7 @@ class StereoNode final : public Node {
                     "",
                     "of rows, each on a thread of its own while a CPU is free (full level)",
                     Fixed{"starts threads"}};
-  Choice accelerator_{this,
-                      "accelerator",
-                      "none",
-                      {"none", "auto", "cuda"},
-                      "a graphics card for the full level: none; auto: if there is one, and it is quicker; cuda",
-                      Fixed{"takes memory of a card"}};
-  Param<double> accelerator_wait_{this,
-                                  "accelerator_wait",
-                                  5.0,
-                                  {0.1, 1000.0},
-                                  "ms",
-                                  "so long a job waits for the card, then the CPU matches",
-                                  Fixed{"part of what is set up on the card"}};
+  cuda::Accelerator accelerator_{this};
   Param<int> cloud_step_{
       this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points; in a run not below its start"};
   Param<std::string> calibration_{this, "calibration", "", kPath,
@@ -384,7 +351,6 @@ class StereoNode final : public Node {
   Transform sensor_in_robot_;
   std::unique_ptr<Matcher> matcher_;
   CudaMatcher* card_matcher_ = nullptr;  ///< matcher_, where that is one
-  std::string_view told_of_card_;
   std::optional<HalfMatcher> half_matcher_;
   std::optional<Rectifier> rectifier_;
   std::optional<RectificationMonitor> monitor_;

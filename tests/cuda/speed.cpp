@@ -1,92 +1,173 @@
 // SPDX-License-Identifier: Apache-2.0
-// speed PLUGIN [MATCHES]: how long a match takes on the card, from images in shared memory to the result there, on
-// noise. No CPU beside it.
+// speed PLUGIN [RUNS]: how long a match, and co-occurrences of windows, take on the card, from images in memory that
+// the card sees to the result; and on one thread of the CPU, some runs before and some after it.
 #include <dlfcn.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <random>
+#include <string>
 #include <vector>
 
-#include "nodes/cuda/table.hpp"
+#include "nodes/object_detection/cooccurrence_stage.hpp"
+#include "nodes/stereo/cuda_matcher.hpp"
 
-using namespace takt::cuda;
+using namespace takt;
 
 namespace {
 
-struct Row {
-  const char* name;
-  StereoShape shape;
-};
-
-const Row kRows[] = {
-    {"640x480x150 gradient", {640, 480, 3, 150, 0, 10, 15, 5, 0, 0, 0, 0, 0}},
-    {"640x480x150 gradient, left-right check", {640, 480, 3, 150, 0, 10, 15, 5, 0, 0, 0, 1, 0}},
-    {"640x480x150 census", {640, 480, 3, 150, 3, 24, 9, 5, 0, 0, 0, 0, 0}},
-    {"640x480x150 ssd", {640, 480, 3, 150, 1, 50, 15, 5, 0, 0, 0, 0, 0}},
-    {"640x480x150 semi-global, median", {640, 480, 3, 150, 3, 24, 1, 1, 0, 0, 1, 0, 1}},
-    {"1280x960x256 gradient", {1280, 960, 3, 256, 0, 10, 15, 5, 0, 0, 0, 0, 0}},
-    {"1280x960x256 gradient, left-right check", {1280, 960, 3, 256, 0, 10, 15, 5, 0, 0, 0, 1, 0}},
-    {"1280x960x256 census, left-right check", {1280, 960, 3, 256, 3, 24, 9, 5, 0, 0, 0, 1, 0}},
-    {"1280x960x256 semi-global, median", {1280, 960, 3, 256, 3, 24, 1, 1, 0, 0, 1, 0, 1}},
-};
-
-bool measure(const Table& cuda, const Row& row, size_t matches) {
-  const StereoShape& s = row.shape;
-  const auto pixels = static_cast<size_t>(s.width) * static_cast<size_t>(s.height),
-             bytes = (9 * pixels + 4095) / 4096 * 4096;
-  auto* memory = static_cast<uint8_t*>(std::aligned_alloc(4096, bytes));
-  std::mt19937 random(1);
-  for (size_t i = 0; i < bytes; ++i) memory[i] = static_cast<uint8_t>(random());
-  char why[kWhyBytes] = "";
-  StereoOnCard* stereo = cuda.register_memory(memory, bytes) ? cuda.make_stereo(&s, 0, why) : nullptr;
-  if (stereo == nullptr) return std::printf("%s: %s\n", row.name, why), false;
-  const StereoCall call{memory,
-                        memory + 3 * pixels,
-                        3 * s.width,
-                        3 * s.width,
-                        reinterpret_cast<int16_t*>(memory + 6 * pixels),
-                        memory + 8 * pixels,
-                        nullptr,
-                        s.width,
-                        s.width,
-                        s.width,
-                        s.disparities,
-                        0,
-                        14,
-                        60};
-  std::vector<double> ms;
-  while (ms.size() < matches) {
-    const auto begun = std::chrono::steady_clock::now();
-    if (cuda.match(stereo, &call, 1'000'000'000) != Outcome::done) break;
-    ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count());
+/// Pages that the card sees, filled with noise.
+class Shared {
+ public:
+  Shared(const cuda::Table& table, size_t bytes)
+      : table_(table),
+        bytes_((bytes + 4095) / 4096 * 4096),
+        memory_(static_cast<uint8_t*>(std::aligned_alloc(4096, bytes_))) {
+    std::mt19937 random(1);
+    for (size_t i = 0; i < bytes_; ++i) memory_[i] = static_cast<uint8_t>(random());
+    registered_ = table.register_memory(memory_, bytes_);
   }
-  const bool all = ms.size() == matches;
-  std::sort(ms.begin(), ms.end());
-  if (all)
-    std::printf("%-42s p50 %.3f  p99 %.3f  max %.3f ms\n", row.name, ms[matches / 2], ms[matches * 99 / 100],
-                ms.back());
-  else std::printf("%s: a match failed\n", row.name);
-  cuda.free_stereo(stereo);
-  cuda.forget_memory(memory);
-  std::free(memory);
-  return all;
+  ~Shared() {
+    if (registered_) table_.forget_memory(memory_);
+    std::free(memory_);
+  }
+  Shared(const Shared&) = delete;
+  Shared& operator=(const Shared&) = delete;
+  bool registered() const { return registered_; }
+  uint8_t* at(size_t byte = 0) const { return memory_ + byte; }
+
+ private:
+  const cuda::Table& table_;
+  const size_t bytes_;
+  uint8_t* const memory_;
+  bool registered_ = false;
+};
+
+struct Times {
+  std::vector<double> ms;
+  /// False if one fails.
+  template <class Run>
+  bool add(size_t runs, Run run) {
+    for (; runs > 0; --runs) {
+      const auto begun = std::chrono::steady_clock::now();
+      if (!run()) return false;
+      ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count());
+    }
+    return true;
+  }
+  std::string text() {
+    std::sort(ms.begin(), ms.end());
+    char line[100];
+    std::snprintf(line, sizeof line, "p50 %.3f, p99 %.3f, max %.3f", ms[ms.size() / 2], ms[ms.size() * 99 / 100],
+                  ms.back());
+    return line;
+  }
+};
+
+/// Prints both sides; false if a run fails.
+template <class OnCard, class OnCpu>
+bool measure(const std::string& name, const char* target, size_t runs, OnCard on_card, OnCpu on_cpu) {
+  constexpr size_t kOfCpu = 10;
+  Times card, cpu;
+  const bool good = cpu.add(kOfCpu, on_cpu) && card.add(runs, on_card) && cpu.add(kOfCpu, on_cpu);
+  if (good)
+    std::printf("%-46s %s ms; CPU, one thread, %s: %s ms\n", name.c_str(), card.text().c_str(), target,
+                cpu.text().c_str());
+  else std::printf("%s: a run failed\n", name.c_str());
+  return good;
+}
+
+bool measure_match(const cuda::Card& card, const std::string& name, int width, int height,
+                   const stereo::MatcherParameters& p, size_t runs) {
+  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  const Shared memory(*card.cuda, 9 * pixels);
+  const ImageView<const uint8_t> left(memory.at(), width, height, 3), right(memory.at(3 * pixels), width, height, 3);
+  const stereo::DisparityViews out{{reinterpret_cast<int16_t*>(memory.at(6 * pixels)), width, height},
+                                   {memory.at(8 * pixels), width, height}};
+  stereo::CudaMatcher matcher(width, height, 3, p, {card, 1'000'000'000});
+  const auto twin = stereo::make_matcher(width, height, 3, p);
+  const std::string size = std::to_string(width) + "x" + std::to_string(height) + "x" + std::to_string(p.disparities);
+  return measure(
+             size + " " + name, twin->target(), runs,
+             [&] { return matcher.match(left, right, out) && matcher.trouble().empty(); },
+             [&] { return twin->match(left, right, out); }) &&
+         memory.registered();
+}
+
+bool measure_matches(const cuda::Card& card, size_t runs) {
+  using stereo::CostKind;
+  stereo::MatcherParameters gradient, census, ssd;
+  census.cost = CostKind::census;
+  census.n_square = 9;
+  ssd.cost = CostKind::ssd;
+  const auto with_check = [](stereo::MatcherParameters p) {
+    p.left_right_check = true;
+    return p;
+  };
+  const auto far = [](stereo::MatcherParameters p) {
+    p.disparities = 256;
+    return p;
+  };
+  bool good = measure_match(card, "gradient", 640, 480, gradient, runs);
+  good = measure_match(card, "gradient, check", 640, 480, with_check(gradient), runs) && good;
+  good = measure_match(card, "census", 640, 480, census, runs) && good;
+  good = measure_match(card, "ssd", 640, 480, ssd, runs) && good;
+  good = measure_match(card, "semi-global, median", 640, 480, stereo::MatcherParameters::quality(), runs) && good;
+  good = measure_match(card, "gradient", 1280, 960, far(gradient), runs) && good;
+  good = measure_match(card, "gradient, check", 1280, 960, with_check(far(gradient)), runs) && good;
+  good = measure_match(card, "census, check", 1280, 960, with_check(far(census)), runs) && good;
+  return measure_match(card, "semi-global, median", 1280, 960, far(stereo::MatcherParameters::quality()), runs) && good;
+}
+
+/// Windows of an image of patches against three objects of a dozen views each, cut out of the image.
+bool measure_windows(const cuda::Card& card, int patch, size_t count, size_t runs) {
+  using namespace object_detection;
+  constexpr int kWidth = 640, kHeight = 480, kObjects = 3, kViews = 12, kView = 48;
+  const SearchGrid grid = make_search_grid(kWidth, kHeight, kView, 64);
+  const PairBins bins;
+  const Shared memory(*card.cuda, size_t{3} * kWidth * kHeight);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      std::copy_n(memory.at(static_cast<size_t>(3 * (y / patch * 997 + x / patch))), 3,
+                  memory.at(static_cast<size_t>(3 * (y * kWidth + x))));
+  const ImageView<const uint8_t> image(memory.at(), kWidth, kHeight, 3);
+  std::vector<std::vector<Histogram>> objects(kObjects);
+  for (int i = 0; i < kObjects * kViews; ++i)
+    objects[static_cast<size_t>(i / kViews)].push_back(
+        cooccurrence_histogram({&image.at(i * 16, i * 12), kView, kView, 3, image.stride}, bins));
+  std::vector<WindowOfObject> questions;
+  for (size_t i = 0; i < count; ++i)
+    for (size_t object = 0; object < kObjects; ++object)
+      questions.push_back({i * static_cast<size_t>(grid.windows()) / count, object});
+  const CooccurrenceStage stage(grid, bins, objects);
+  CudaCooccurrences on_card(grid, bins, stage.references(), {card, 1'000'000'000});
+  CooccurrenceStage twin(grid, bins, objects);
+  return measure(
+      std::to_string(count) + " windows, co-occurrences, " + (patch == 1 ? "noise" : "patches"), "SIMD", runs,
+      [&] { return on_card.find(image, questions); },
+      [&] {
+        for (const WindowOfObject& question : questions) (void)twin.missing(image, question.window, question.object);
+        return true;
+      });
 }
 
 }  // namespace
 
 int main(int count, char** words) {
   void* module = count > 1 ? dlopen(words[1], RTLD_NOW | RTLD_LOCAL) : nullptr;
-  if (module == nullptr) return std::printf("%s\n", count > 1 ? dlerror() : "speed PLUGIN [MATCHES]"), 2;
-  const auto* cuda = static_cast<const Table*>(dlsym(module, "takt_cuda"));
-  char text[kWhyBytes] = "";
-  if (cuda->cards(text) <= 0) return std::printf("NOT RUN: no card: %s\n", text), 77;
-  cuda->card_name(0, text);
+  if (module == nullptr) return std::printf("%s\n", count > 1 ? dlerror() : "speed PLUGIN [RUNS]"), 2;
+  const auto* table = static_cast<const cuda::Table*>(dlsym(module, "takt_cuda"));
+  char text[cuda::kWhyBytes] = "";
+  if (table->cards(text) <= 0) return std::printf("NOT RUN: no card: %s\n", text), 77;
+  table->card_name(0, text);
   std::printf("%s, default policy\n", text);
-  const auto matches = static_cast<size_t>(count > 2 ? std::atoi(words[2]) : 2000);
-  return std::all_of(std::begin(kRows), std::end(kRows), [&](const Row& row) { return measure(*cuda, row, matches); })
-             ? 0
-             : 1;
+  const auto runs = static_cast<size_t>(count > 2 ? std::atoi(words[2]) : 2000);
+  const cuda::Card card{table, 0, text};
+  bool good = measure_matches(card, runs);
+  for (const int patch : {1, 23})
+    for (const size_t windows : {size_t{999}, size_t{10}}) good = measure_windows(card, patch, windows, runs) && good;
+  return good ? 0 : 1;
 }

@@ -2,8 +2,9 @@
 // What the kernel grants to SCHED_DEADLINE before and after threads were taken out of their reservations: lifts [COUNT]
 // At random instants the watchdog's way (JobWatch::lift), COUNT times each (default 1000), of a thread whose jobs
 // compute, sleep as Takt does between jobs, or block in read(). Where the kernel forgets the thread (docs/limits.md) it
-// is rescued as the watchdog does it. Prints a line for each. Exit 1 if bandwidth was lost or a thread never went on;
-// 77 without the right to SCHED_DEADLINE. Nobody else should take or leave reservations meanwhile.
+// is rescued as the watchdog does it. Prints a line for each. Exit 1 if a thread never went on, or bandwidth was lost:
+// where a job blocks, if a lift did not tell it, or the command that is told then does not bring it back. 77 without
+// the right to SCHED_DEADLINE. Nobody else should take or leave reservations meanwhile.
 #include <unistd.h>
 
 #include <array>
@@ -12,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <random>
+#include <string>
 #include <thread>
 
 #include "rt/memory/memory_use.hpp"
@@ -139,6 +141,7 @@ class Feeder {
 
 struct Lifted {
   int count = 0, rescues = 0;
+  int told = 0;        ///< lifts that may have met a sleeping thread, and said so
   bool stuck = false;  ///< it never went on
 };
 
@@ -152,11 +155,40 @@ Lifted lift_often(Work work, int count, std::mt19937& random) {
     const auto lift = worker.watch().lift(MonotonicClock().now_ns(), 0, i % 2 == 0);
     refused = lift == JobWatch::Lift::refused ? refused + 1 : 0;
     lifted.count += lift != JobWatch::Lift::refused;
+    lifted.told += lift == JobWatch::Lift::slept;
     worker.rescue_if_forgotten();
   }
   lifted.stuck = !worker.end();
   lifted.rescues = worker.rescues();
   return lifted;
+}
+
+constexpr double kShare = 0.1, kCounted = 0.001;  // cores: of a worker, and what is a difference
+
+/// Runs the command that a loss is told with; whether all is free again.
+bool counted_anew(double before) {
+  std::string command = recount_command() + " >/dev/null";
+  command.erase(0, command.find("sysctl"));  // as root already
+  return std::system(command.c_str()) == 0 && std::abs(free_bandwidth().value_or(0) - before) < kCounted;
+}
+
+/// Prints what became of such lifts; whether that is as docs/limits.md has it.
+bool holds(Work work, const char* name, int count, std::mt19937& random) {
+  constexpr int64_t kReturned_ns = 100 * kMs;  // by then all that a thread left behind is given back
+  const double before = free_bandwidth().value_or(0);
+  const Lifted lifted = lift_often(work, count, random);
+  pause(kReturned_ns);
+  const double after = free_bandwidth().value_or(0), lost = before - after;
+  const bool loses = std::abs(lost) >= kCounted, may = work == Work::reads && lost <= lifted.told * kShare + kCounted;
+  const bool kept = lifted.count >= count && !lifted.stuck && (!loses || (may && counted_anew(before)));
+  std::printf(
+      "%-9s %5d lifts: %.4f cores free before, %.4f after; %d may have met a sleeping thread; forgotten and "
+      "rescued %d times%s%s\n",
+      name, lifted.count, before, after, lifted.told, lifted.rescues, lifted.stuck ? ", once never again" : "",
+      !kept   ? "  FAILED"
+      : loses ? "; all free again once the kernel counted anew"
+              : "");
+  return kept;
 }
 
 }  // namespace
@@ -171,17 +203,7 @@ int main(int argc, char** argv) {
   std::mt19937 random(7);
   bool good = true;
   for (const auto& [work, name] :
-       {std::pair{Work::computes, "computes"}, {Work::sleeps, "sleeps"}, {Work::reads, "reads"}}) {
-    constexpr int64_t kReturned_ns = 100 * kMs;  // by then all that a thread left behind is given back
-    const double before = free_bandwidth().value_or(0);
-    const Lifted lifted = lift_often(work, count, random);
-    pause(kReturned_ns);
-    const double after = free_bandwidth().value_or(0);
-    const bool kept = lifted.count >= count && !lifted.stuck && std::abs(after - before) < 0.001;
-    std::printf("%-9s %5d lifts: %.4f cores free before, %.4f after; forgotten and rescued %d times%s%s\n", name,
-                lifted.count, before, after, lifted.rescues, lifted.stuck ? ", once never again" : "",
-                kept ? "" : "  FAILED");
-    good = good && kept;
-  }
+       {std::pair{Work::computes, "computes"}, {Work::sleeps, "sleeps"}, {Work::reads, "reads"}})
+    good = holds(work, name, count, random) && good;
   return good ? 0 : 1;
 }

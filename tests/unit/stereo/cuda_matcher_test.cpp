@@ -36,6 +36,9 @@ const cuda::Table kShim{
       return next_outcome;
     },
     [](cuda::StereoOnCard* card) { --alive, delete card; },
+    nullptr,
+    nullptr,
+    nullptr,
     [](void*, size_t) { return true; },
     [](void*) {}};
 
@@ -50,7 +53,7 @@ struct CardScene {
   CudaMatcher matcher;
 
   explicit CardScene(MatcherParameters wanted = {})
-      : p(wanted), matcher(kWide, kHigh, 1, wanted, cuda::Card{&kShim, 0, "a shim"}, 1'500'000) {
+      : p(wanted), matcher(kWide, kHigh, 1, wanted, {{&kShim, 0, "a shim"}, 1'500'000}) {
     for (size_t i = 0; i < left.size(); ++i)
       left[i] = static_cast<uint8_t>(i * 97 % 251), right[i] = static_cast<uint8_t>((i + 4) * 97 % 251);
     asked = 0;
@@ -80,13 +83,13 @@ TEST_CASE("the card matches while it is in time; the CPU does what comes late, t
   CHECK(scene.by_card());
   CHECK(scene.matcher.trouble().empty());
   next_outcome = cuda::Outcome::late;
-  for (int i = 0; i < CudaMatcher::kMostLate; ++i) {
+  for (int i = 0; i < cuda::Trust::kMostLate; ++i) {
     CHECK_FALSE(scene.by_card());
     CHECK(scene.matcher.trouble() == "a shim was later than 1500 us");
   }
   next_outcome = cuda::Outcome::done;
   const int asked_before = asked;
-  for (int i = 0; i + 1 < CudaMatcher::kPause; ++i) CHECK_FALSE(scene.by_card());
+  for (int i = 0; i < cuda::Trust::kPause; ++i) CHECK_FALSE(scene.by_card());
   CHECK(asked == asked_before);
   CHECK(scene.by_card());
   CHECK(scene.matcher.trouble().empty());
@@ -101,7 +104,7 @@ TEST_CASE("a card that has failed is not asked again, and is let go") {
     next_outcome = cuda::Outcome::failed;
     CHECK_FALSE(scene.by_card());
     next_outcome = cuda::Outcome::done;
-    for (int i = 0; i < 2 * CudaMatcher::kPause; ++i) CHECK_FALSE(scene.by_card());
+    for (int i = 0; i < 2 * cuda::Trust::kPause; ++i) CHECK_FALSE(scene.by_card());
     CHECK(asked == 1);
     CHECK(scene.matcher.trouble() == "a shim has failed, and is not asked again");
   }

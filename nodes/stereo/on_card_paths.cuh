@@ -2,9 +2,9 @@
 // Internal: semi-global matching of the census cost, bit for bit as stereo::reference::semi_global.
 //
 //   paths         the cheapest paths to each pixel from the left, the right and above: a volume of bytes each
-//   decide_paths  their sums, winner, fraction, ambiguity: a key for each pixel (stereo_kernels.cuh)
+//   decide_paths  their sums, winner, fraction, ambiguity: a key for each pixel (on_card_windows.cuh)
 #pragma once
-#include "nodes/cuda/stereo_kernels.cuh"
+#include "nodes/stereo/on_card_windows.cuh"
 
 namespace takt::cuda {
 

@@ -16,15 +16,6 @@ struct Features {
   uint64_t* census;  ///< the 48 bits
 };
 
-/// Between CPU and card, in memory that both see: numbers of matches.
-struct Turn {
-  uint32_t wanted;     ///< by the CPU
-  uint32_t withdrawn;  ///< by the CPU: its result is not wanted any more
-  uint32_t writing;    ///< by the card: what it was asked for begins to be written, unless it was withdrawn before
-  uint32_t written;    ///< by the card: the last one that was not withdrawn
-  uint32_t done;       ///< by the card
-};
-
 struct Work {
   StereoShape shape;
   int groups;  ///< of kGroup disparities
@@ -32,8 +23,7 @@ struct Work {
   void* volume;
   uint32_t *keys, *left_keys, *right_keys;
   const StereoCall* call;  ///< read on the card with each match
-  Turn* turn;
-  bool* withdrawn;  ///< on the card: what was found is not written
+  const bool* withdrawn;   ///< on the card: what was found is not written
 };
 
 }  // namespace takt::cuda

@@ -1,29 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
-#include <cstring>
+#include "nodes/stereo/on_card.cuh"
 
-#include "nodes/cuda/memory.cuh"
-#include "nodes/cuda/path_kernels.cuh"
-#include "nodes/cuda/stereo.cuh"
-#include "nodes/cuda/stereo_kernels.cuh"
+#include <cstring>
+#include <type_traits>
+
+#include "nodes/stereo/on_card_paths.cuh"
+#include "nodes/stereo/on_card_windows.cuh"
 
 namespace takt::cuda {
 namespace {
 
-constexpr int kRehearsals = 20;
-constexpr int64_t kRehearsal_ns = 2'000'000'000;
-constexpr int64_t kWriting_ns = 20'000'000;  // several time slices of other processes
 constexpr int kThreads = 128;
 constexpr size_t kBeside = 16;  // bytes around the planes of derivatives (four_from)
-
-int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-unsigned blocks(size_t count, int threads) {
-  return static_cast<unsigned>((count + static_cast<size_t>(threads) - 1) / static_cast<size_t>(threads));
-}
 
 bool is_narrow(const StereoShape& s) {
   return (s.cost == kGradient || s.cost == kCensus) && s.c_max * s.n_square <= 255;
@@ -95,9 +83,7 @@ void search(const Work& w, bool of_right, cudaStream_t stream) {
 
 }  // namespace
 
-StereoOnCard::StereoOnCard(const StereoShape& shape, int card) : shape_(shape), card_(card) {
-  check(cudaSetDevice(card), "cudaSetDevice");
-  check(cudaStreamCreateWithFlags(&stream_.handle, cudaStreamNonBlocking), "cudaStreamCreate");
+StereoOnCard::StereoOnCard(const StereoShape& shape, int card) : shape_(shape), captured_(card) {
   const auto pixels = static_cast<size_t>(shape.width) * static_cast<size_t>(shape.height);
   work_.shape = shape;
   work_.groups = (shape.disparities + kGroup - 1) / kGroup;
@@ -113,40 +99,25 @@ StereoOnCard::StereoOnCard(const StereoShape& shape, int card) : shape_(shape), 
   work_.keys = card_memory_.take<uint32_t>(pixels);
   work_.left_keys = card_memory_.take<uint32_t>(pixels);
   if (shape.left_right_check) work_.right_keys = card_memory_.take<uint32_t>(pixels);
-  shared_ = shared_memory_.take<Shared>(1);
+  call_ = shared_memory_.take<StereoCall>(1);
   for (auto& image : staged_images_) image = shared_memory_.take<uint8_t>(pixels * static_cast<size_t>(shape.channels));
   staged_disparity_ = shared_memory_.take<int16_t>(pixels);
   staged_confidence_ = shared_memory_.take<uint8_t>(pixels);
   staged_fraction_ = shared_memory_.take<uint8_t>(pixels);
-  work_.call = &shared_->call;
-  work_.turn = &shared_->turn;
-  work_.withdrawn = card_memory_.take<bool>(1);
-  capture();
-  rehearse();
-}
-
-StereoOnCard::~StereoOnCard() {
-  cudaSetDevice(card_);
-  if (stream_.handle != nullptr) cudaStreamSynchronize(stream_.handle);
-}
-
-void StereoOnCard::enqueue(cudaStream_t stream) const {
+  work_.call = call_;
+  work_.withdrawn = captured_.withdrawn();
   const dim3 rows(blocks(static_cast<size_t>(shape_.width), kThreads), static_cast<unsigned>(shape_.height), 2);
+  captured_.capture([&](cudaStream_t stream) { enqueue(rows, stream); },
+                    [&](cudaStream_t stream) { write<<<dim3(rows.x, rows.y), kThreads, 0, stream>>>(work_); });
+  *call_ = own_call();
+  captured_.rehearse();
+}
+
+void StereoOnCard::enqueue(const dim3& rows, cudaStream_t stream) const {
   load<<<dim3(blocks(static_cast<size_t>(shape_.width), 4 * kThreads), rows.y, 2), kThreads, 0, stream>>>(work_);
   if (shape_.cost == kGradient || shape_.cost == kCensus) make_features<<<rows, kThreads, 0, stream>>>(work_);
   search(work_, false, stream);
   if (shape_.left_right_check) search(work_, true, stream);
-  begin_to_write<<<1, 1, 0, stream>>>(work_);
-  write<<<dim3(rows.x, rows.y), kThreads, 0, stream>>>(work_);
-  tell<<<1, 1, 0, stream>>>(work_);
-}
-
-void StereoOnCard::capture() {
-  check(cudaStreamBeginCapture(stream_.handle, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
-  enqueue(stream_.handle);
-  check(cudaStreamEndCapture(stream_.handle, &graph_.handle), "cudaStreamEndCapture");
-  check(cudaGraphInstantiate(&runs_.handle, graph_.handle, 0), "cudaGraphInstantiate");
-  check(cudaGraphUpload(runs_.handle, stream_.handle), "cudaGraphUpload");
 }
 
 /// In and out of its own memory.
@@ -164,69 +135,25 @@ StereoCall StereoOnCard::own_call() const {
   return call;
 }
 
-void StereoOnCard::rehearse() {
-  for (int i = 0; i < kRehearsals; ++i) {
-    if (run(own_call(), now_ns() + kRehearsal_ns) == Outcome::done) continue;
-    check(cudaStreamSynchronize(stream_.handle), "the first match");
-    throw CardError("the first match took longer than 2 s");
-  }
-}
-
-/// The memory of both sides is the card's, too; no match is under way.
-Outcome StereoOnCard::run(const StereoCall& call, int64_t until_ns) {
-  shared_->call = call;
-  ++volatile_turn().wanted;
-  if (cudaGraphLaunch(runs_.handle, stream_.handle) != cudaSuccess) return Outcome::failed;
-  const Outcome outcome = wait(until_ns);
-  return outcome == Outcome::late ? withdraw() : outcome;
-}
-
-Outcome StereoOnCard::wait(int64_t until_ns) const {
-  constexpr int kAskEvery = 4096;
-  const volatile Turn& turn = volatile_turn();
-  for (int looked = 1; turn.done != turn.wanted; ++looked) {
-    if (now_ns() >= until_ns) return Outcome::late;
-    if (looked % kAskEvery != 0) continue;
-    const cudaError_t state = cudaStreamQuery(stream_.handle);
-    if (state != cudaSuccess && state != cudaErrorNotReady) return Outcome::failed;
-  }
-  std::atomic_thread_fence(std::memory_order_acquire);
-  return Outcome::done;
-}
-
-/// What is late writes nothing any more, or is waited for: it would write into a message of others.
-Outcome StereoOnCard::withdraw() {
-  volatile Turn& turn = volatile_turn();
-  turn.withdrawn = turn.wanted;
-  std::atomic_thread_fence(std::memory_order_seq_cst);
-  if (turn.writing != turn.wanted) return Outcome::late;
-  if (wait(now_ns() + kWriting_ns) != Outcome::done) return Outcome::failed;
-  return turn.written == turn.wanted ? Outcome::done : Outcome::late;
-}
-
 /// Images are read and results written where they lie, if their pages are registered; else by way of own memory.
 Outcome StereoOnCard::match(const StereoCall& asked, int64_t bound_ns) {
-  if (cudaSetDevice(card_) != cudaSuccess) return Outcome::failed;
-  // What was late before must be gone: it may still read what this would change.
-  const int64_t until_ns = now_ns() + bound_ns;
-  if (const Outcome before = wait(until_ns); before != Outcome::done) return before;
+  const int64_t until_ns = Captured::now_ns() + bound_ns;
+  if (const Outcome before = captured_.settle(until_ns); before != Outcome::done) return before;
   StereoCall call = own_call();
   call.disparities = asked.disparities;
   call.min_confidence = asked.min_confidence;
   call.p1 = asked.p1;
   call.p2 = asked.p2;
   const size_t row = static_cast<size_t>(shape_.width) * static_cast<size_t>(shape_.channels);
-  const auto take = [&](const uint8_t* image, ptrdiff_t stride, uint8_t* staged, const uint8_t*& to,
-                        ptrdiff_t& to_stride) {
-    if (const void* seen = registered().on_card(image)) {
-      to = static_cast<const uint8_t*>(seen);
-      to_stride = stride;
-      return;
-    }
-    for (int y = 0; y < shape_.height; ++y) std::memcpy(staged + static_cast<size_t>(y) * row, image + y * stride, row);
+  const auto take = [&](const uint8_t* image, ptrdiff_t stride, uint8_t* staged) {
+    return seen_by_card({image, stride}, row, shape_.height, staged);
   };
-  take(asked.left, asked.left_stride, staged_images_[0], call.left, call.left_stride);
-  take(asked.right, asked.right_stride, staged_images_[1], call.right, call.right_stride);
+  const ImageOnCard left = take(asked.left, asked.left_stride, staged_images_[0]),
+                    right = take(asked.right, asked.right_stride, staged_images_[1]);
+  call.left = left.pixels;
+  call.left_stride = left.stride;
+  call.right = right.pixels;
+  call.right_stride = right.stride;
   const auto direct = [&](auto* wanted, ptrdiff_t stride, auto*& to, ptrdiff_t& to_stride) {
     void* seen = wanted == nullptr ? nullptr : registered().on_card(wanted);
     if (wanted != nullptr && seen == nullptr) return;
@@ -236,7 +163,8 @@ Outcome StereoOnCard::match(const StereoCall& asked, int64_t bound_ns) {
   direct(asked.disparity, asked.disparity_stride, call.disparity, call.disparity_stride);
   direct(asked.confidence, asked.confidence_stride, call.confidence, call.confidence_stride);
   direct(asked.fraction, asked.fraction_stride, call.fraction, call.fraction_stride);
-  if (const Outcome outcome = run(call, until_ns); outcome != Outcome::done) return outcome;
+  *call_ = call;
+  if (const Outcome outcome = captured_.run(until_ns); outcome != Outcome::done) return outcome;
   const auto fetch = [&](auto* to, ptrdiff_t stride, const auto* used, const auto* staged) {
     const auto width = static_cast<size_t>(shape_.width);
     for (int y = 0; used == staged && y < shape_.height; ++y)

@@ -14,7 +14,9 @@
 #pragma once
 #include <cstdint>
 
-#include "nodes/cuda/stereo_work.hpp"
+#include "nodes/cuda/pixels.cuh"
+#include "nodes/stereo/on_card_work.hpp"
+#include "nodes/stereo/parameters.hpp"
 
 namespace takt::cuda {
 
@@ -23,7 +25,7 @@ constexpr int kRun = 32;    // pixels that a warp decides
 constexpr int kStrip = 48;  // rows that a thread goes down in column_sums
 constexpr int kFilterWidth = 32, kFilterHeight = 16;
 constexpr int kMostRadius = 15;
-constexpr int kFractions = 64, kNoFraction = 32;
+using stereo::kFractions, stereo::kNoFraction;
 constexpr uint32_t kNoKey = 0xFFFFFFFF;
 
 __device__ inline int clamp_to(int value, int count) { return value < 0 ? 0 : value >= count ? count - 1 : value; }
@@ -39,11 +41,7 @@ __device__ inline uint32_t warp_min(uint32_t value) {
 
 // --- load, make_features
 
-__device__ inline uint8_t grey_of(int b, int g, int r) {
-  return static_cast<uint8_t>((29 * b + 150 * g + 77 * r + 128) >> 8);
-}
-
-/// A thread takes four pixels of a row; blockIdx.z is the image. Words where row and memory allow.
+/// A thread takes four pixels of a row; blockIdx.z is the image.
 __global__ void load(Work w) {
   const StereoShape& s = w.shape;
   const int x0 = 4 * static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x), y = static_cast<int>(blockIdx.y);
@@ -51,28 +49,22 @@ __global__ void load(Work w) {
   const bool right = blockIdx.z != 0;
   const uint8_t* row =
       (right ? w.call->right : w.call->left) + y * (right ? w.call->right_stride : w.call->left_stride);
-  const int count = min(4, s.width - x0), bytes = count * s.channels;
-  uint32_t words[3] = {};
-  auto* in = reinterpret_cast<uint8_t*>(words);
-  const uint8_t* from = row + x0 * s.channels;
-  if (count == 4 && reinterpret_cast<uintptr_t>(from) % 4 == 0)
-    for (int i = 0; i < s.channels; ++i) words[i] = reinterpret_cast<const uint32_t*>(from)[i];
-  else
-    for (int i = 0; i < bytes; ++i) in[i] = from[i];
+  const int count = min(4, s.width - x0);
+  const FourPixels four(row + x0 * s.channels, count, s.channels);
   uint8_t* out = (right ? w.right : w.left).pixels + static_cast<size_t>(y) * s.width + x0;
   const size_t plane = static_cast<size_t>(s.width) * s.height;
   const bool grey = s.cost == kGradient || s.cost == kCensus;
   for (int i = 0; i < count; ++i) {
-    const uint8_t* pixel = in + i * s.channels;
+    const uint8_t* pixel = four[i];
     if (s.channels == 1) out[i] = pixel[0];
-    else if (grey) out[i] = grey_of(pixel[0], pixel[1], pixel[2]);
+    else if (grey) out[i] = stereo::grey_of(pixel[0], pixel[1], pixel[2]);
     else
       for (int c = 0; c < 3; ++c) out[c * plane + i] = pixel[c];
   }
 }
 
 __device__ inline uint8_t derivative(int before, int after) {
-  return static_cast<uint8_t>(max(-128, min(127, after - before)) + 128);
+  return static_cast<uint8_t>(stereo::twice_derivative(before, after) + 128);
 }
 
 __global__ void make_features(Work w) {
@@ -298,13 +290,6 @@ struct LaneSums {
   }
 };
 
-__device__ inline int fraction_of(int before, int best, int after) {
-  const int slope = before - after, bend = before - 2 * best + after;
-  if (bend <= 0) return kNoFraction;
-  const int doubled = kFractions * slope / bend;
-  return max(0, min(kFractions - 1, (doubled + (doubled < 0 ? -1 : 1)) / 2 + kNoFraction));
-}
-
 /// With fraction and ambiguity; `most` stands for the second best where there is none. All lanes of the warp.
 template <int kWords>
 __device__ inline uint32_t finished(uint32_t key, const LaneSums<kWords>& sums, const StereoShape& s, int disparities,
@@ -319,7 +304,7 @@ __device__ inline uint32_t finished(uint32_t key, const LaneSums<kWords>& sums, 
   });
   int fraction = kNoFraction;
   if (s.subpixel && winner > 0 && winner + 1 < disparities)
-    fraction = fraction_of(static_cast<int>(warp_min(before)), best, static_cast<int>(warp_min(after)));
+    fraction = stereo::fraction_of(static_cast<int>(warp_min(before)), best, static_cast<int>(warp_min(after)));
   bool ambiguous = false;
   if (s.uniqueness > 0) {
     second = warp_min(second);
@@ -405,15 +390,6 @@ __device__ inline int median_fine(const uint32_t* keys, const StereoShape& s, in
   return nine[4];
 }
 
-/// Before anything is written: the CPU sees that this match writes, or this sees that it was withdrawn, or both.
-__global__ void begin_to_write(Work w) {
-  volatile Turn& turn = *w.turn;
-  const uint32_t wanted = turn.wanted;
-  turn.writing = wanted;
-  __threadfence_system();
-  *w.withdrawn = turn.withdrawn == wanted;
-}
-
 __global__ void write(Work w) {
   if (*w.withdrawn) return;
   const StereoShape& s = w.shape;
@@ -424,7 +400,7 @@ __global__ void write(Work w) {
   const int fine = s.median ? median_fine(w.left_keys, s, x, y) : static_cast<int>((key & 0xFFFF) >> 1);
   const int most = s.semi_global ? 3 * (s.c_max + call.p2) : s.c_max * s.n_square * s.n_square;
   const int disparity = fine / kFractions, sum = static_cast<int>(key >> 16);
-  const auto confidence = static_cast<uint8_t>((int64_t{255} * (most - sum) + most / 2) / most);
+  const uint8_t confidence = stereo::confidence_of(sum, most);
   bool keep = confidence >= call.min_confidence && (key & 1) == 0;
   if (keep && s.left_right_check) {
     const int xr = x - disparity;
@@ -434,15 +410,6 @@ __global__ void write(Work w) {
   call.disparity[y * call.disparity_stride + x] = static_cast<int16_t>(keep ? disparity : -1);
   call.confidence[y * call.confidence_stride + x] = confidence;
   if (call.fraction != nullptr) call.fraction[y * call.fraction_stride + x] = static_cast<uint8_t>(fine % kFractions);
-}
-
-/// Behind all of the above: what they wrote is there before the CPU sees this.
-__global__ void tell(Work w) {
-  __threadfence_system();
-  volatile Turn& turn = *w.turn;
-  if (!*w.withdrawn) turn.written = turn.wanted;
-  __threadfence_system();
-  turn.done = turn.wanted;
 }
 
 }  // namespace takt::cuda
