@@ -20,84 +20,144 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kByteLanes = static_cast<int>(hn::MaxLanes(kByteTag));
 
-/// Every lane moved up by one; the last lane of `before` enters.
-HWY_INLINE Vec8 one_up(Vec8 v, Vec8 before) {
+/// The costs of a path at the disparities of one vector, as their neighbours need them.
+struct Costs {
 #if HWY_TARGET == HWY_AVX3_DL
-  HWY_ALIGN static constexpr uint8_t kFrom[64] = {127, 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14,
-                                                  15,  16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30,
-                                                  31,  32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46,
-                                                  47,  48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62};
-  return Vec8{_mm512_permutex2var_epi8(v.raw, _mm512_load_si512(kFrom), before.raw)};
-#elif HWY_TARGET == HWY_AVX3
-  const __m512i carry = _mm512_alignr_epi64(v.raw, before.raw, 6);
-  return Vec8{_mm512_alignr_epi8(v.raw, carry, 15)};
-#elif HWY_TARGET == HWY_AVX2
-  const __m256i carry = _mm256_permute2x128_si256(before.raw, v.raw, 0x21);
-  return Vec8{_mm256_alignr_epi8(v.raw, carry, 15)};
+  Vec8 here, up, down;  ///< as they are; turned by one lane in either direction
+
+  HWY_INLINE explicit Costs(Vec8 v) : here(v) {
+    HWY_ALIGN static constexpr uint8_t kUp[64] = {63, 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14,
+                                                  15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30,
+                                                  31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46,
+                                                  47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62};
+    HWY_ALIGN static constexpr uint8_t kDown[64] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16,
+                                                    17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32,
+                                                    33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48,
+                                                    49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63, 0};
+    up = Vec8{_mm512_permutexvar_epi8(_mm512_load_si512(kUp), v.raw)};
+    down = Vec8{_mm512_permutexvar_epi8(_mm512_load_si512(kDown), v.raw)};
+  }
 #else
-  return hn::CombineShiftRightBytes<kByteLanes - 1>(kByteTag, v, before);
+  Vec8 here;
+  HWY_INLINE explicit Costs(Vec8 v) : here(v) {}
+#endif
+};
+
+/// Every lane moved up by one; the last lane of `before` enters.
+HWY_INLINE Vec8 one_up(const Costs& v, const Costs& before) {
+#if HWY_TARGET == HWY_AVX3_DL
+  return Vec8{_mm512_mask_blend_epi8(1, v.up.raw, before.up.raw)};
+#elif HWY_TARGET == HWY_AVX3
+  const __m512i carry = _mm512_alignr_epi64(v.here.raw, before.here.raw, 6);
+  return Vec8{_mm512_alignr_epi8(v.here.raw, carry, 15)};
+#elif HWY_TARGET == HWY_AVX2
+  const __m256i carry = _mm256_permute2x128_si256(before.here.raw, v.here.raw, 0x21);
+  return Vec8{_mm256_alignr_epi8(v.here.raw, carry, 15)};
+#else
+  return hn::CombineShiftRightBytes<kByteLanes - 1>(kByteTag, v.here, before.here);
 #endif
 }
 
 /// Every lane moved down by one; the first lane of `after` enters.
-HWY_INLINE Vec8 one_down(Vec8 v, Vec8 after) {
+HWY_INLINE Vec8 one_down(const Costs& v, const Costs& after) {
 #if HWY_TARGET == HWY_AVX3_DL
-  HWY_ALIGN static constexpr uint8_t kFrom[64] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16,
-                                                  17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32,
-                                                  33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48,
-                                                  49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63, 64};
-  return Vec8{_mm512_permutex2var_epi8(v.raw, _mm512_load_si512(kFrom), after.raw)};
+  return Vec8{_mm512_mask_blend_epi8(uint64_t{1} << 63, v.down.raw, after.down.raw)};
 #elif HWY_TARGET == HWY_AVX3
-  const __m512i carry = _mm512_alignr_epi64(after.raw, v.raw, 2);
-  return Vec8{_mm512_alignr_epi8(carry, v.raw, 1)};
+  const __m512i carry = _mm512_alignr_epi64(after.here.raw, v.here.raw, 2);
+  return Vec8{_mm512_alignr_epi8(carry, v.here.raw, 1)};
 #elif HWY_TARGET == HWY_AVX2
-  const __m256i carry = _mm256_permute2x128_si256(v.raw, after.raw, 0x21);
-  return Vec8{_mm256_alignr_epi8(carry, v.raw, 1)};
+  const __m256i carry = _mm256_permute2x128_si256(v.here.raw, after.here.raw, 0x21);
+  return Vec8{_mm256_alignr_epi8(carry, v.here.raw, 1)};
 #else
-  return hn::CombineShiftRightBytes<1>(kByteTag, after, v);
+  return hn::CombineShiftRightBytes<1>(kByteTag, after.here, v.here);
 #endif
 }
 
-/// Smallest of all lanes.
-HWY_INLINE uint8_t smallest_lane(Vec8 v) {
-  const hn::FixedTag<uint16_t, 8> eight;
-#if HWY_TARGET <= HWY_AVX3
-  const hn::FixedTag<uint8_t, 32> half;
-  const hn::FixedTag<uint8_t, 16> quarter;
-  const auto halves = hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v));
-  const auto bytes = hn::Min(hn::LowerHalf(quarter, halves), hn::UpperHalf(quarter, halves));
-#elif HWY_TARGET == HWY_AVX2
-  const hn::FixedTag<uint8_t, 16> quarter;
-  const auto bytes = hn::Min(hn::LowerHalf(quarter, v), hn::UpperHalf(quarter, v));
-#else
-  const auto bytes = v;
-#endif
-  const auto words = hn::BitCast(eight, bytes);
-  const auto low = hn::And(words, hn::Set(eight, 0xFF)), high = hn::ShiftRight<8>(words);
+/// One number, where it was found: on its way to other lanes it need not pass through a register for numbers.
+struct Number {
 #if HWY_TARGET <= HWY_AVX2
-  return static_cast<uint8_t>(_mm_cvtsi128_si32(_mm_minpos_epu16(hn::Min(low, high).raw)));
+  __m128i low;  ///< in its first byte
+
+  HWY_INLINE uint8_t value() const { return static_cast<uint8_t>(_mm_cvtsi128_si32(low)); }
+#if HWY_TARGET <= HWY_AVX3
+  HWY_INLINE Vec8 everywhere() const { return Vec8{_mm512_broadcastb_epi8(low)}; }
 #else
-  return static_cast<uint8_t>(hn::GetLane(hn::MinOfLanes(eight, hn::Min(low, high))));
+  HWY_INLINE Vec8 everywhere() const { return Vec8{_mm256_broadcastb_epi8(low)}; }
+#endif
+  HWY_INLINE static Number of(uint8_t value) { return {_mm_cvtsi32_si128(value)}; }
+#else
+  uint8_t number;
+
+  HWY_INLINE uint8_t value() const { return number; }
+  HWY_INLINE Vec8 everywhere() const { return hn::Set(kByteTag, number); }
+  HWY_INLINE static Number of(uint8_t value) { return {value}; }
+#endif
+};
+
+/// Smallest of sixteen bytes.
+HWY_INLINE Number smallest_of_16(hn::Vec<hn::FixedTag<uint8_t, 16>> bytes) {
+  const hn::FixedTag<uint8_t, 16> sixteen;
+  const hn::FixedTag<uint16_t, 8> eight;
+  // The upper byte of each word is 0 then.
+  const auto words =
+      hn::BitCast(eight, hn::Min(bytes, hn::BitCast(sixteen, hn::ShiftRight<8>(hn::BitCast(eight, bytes)))));
+#if HWY_TARGET <= HWY_AVX2
+  return {_mm_minpos_epu16(words.raw)};
+#else
+  return {static_cast<uint8_t>(hn::GetLane(hn::MinOfLanes(eight, words)))};
 #endif
 }
+
+/// Smallest lane of each.
+struct Smallest {
+  Number of_first, of_second;
+};
+HWY_INLINE Smallest smallest_lanes(Vec8 first, Vec8 second) {
+#if HWY_TARGET <= HWY_AVX3
+  // Both together, as far as that goes.
+  const __m512i a = first.raw, b = second.raw;
+  const __m512i halves = _mm512_min_epu8(_mm512_shuffle_i64x2(a, b, 0x44), _mm512_shuffle_i64x2(a, b, 0xEE));
+  const __m512i quarters = _mm512_min_epu8(halves, _mm512_shuffle_i64x2(halves, halves, 0xB1));
+  using Sixteen = hn::Vec<hn::FixedTag<uint8_t, 16>>;
+  return {smallest_of_16(Sixteen{_mm512_castsi512_si128(quarters)}),
+          smallest_of_16(Sixteen{_mm512_extracti32x4_epi32(quarters, 2)})};
+#elif HWY_TARGET == HWY_AVX2
+  const hn::FixedTag<uint8_t, 16> sixteen;
+  const auto halved = [&](Vec8 v) HWY_ATTR { return hn::Min(hn::LowerHalf(sixteen, v), hn::UpperHalf(sixteen, v)); };
+  return {smallest_of_16(halved(first)), smallest_of_16(halved(second))};
+#else
+  return {smallest_of_16(first), smallest_of_16(second)};
+#endif
+}
+
+/// What a path pays to come to a pixel, of those before: the cheapest way, less the least of them.
+class Ways {
+ public:
+  HWY_INLINE Ways(Number least, const PathRow& row)
+      : p1_(hn::Set(kByteTag, row.p1)), p2_(hn::Set(kByteTag, row.p2)), least_(least.everywhere()) {}
+  /// `straight`: at the same disparity; `beside`: the cheaper one of its neighbours.
+  HWY_INLINE Vec8 cheapest(Vec8 straight, Vec8 beside) const {
+    return hn::Min(hn::Sub(hn::Min(straight, hn::SaturatedAdd(beside, p1_)), least_), p2_);
+  }
+
+ private:
+  Vec8 p1_, p2_, least_;
+};
 
 /// One path through a pixel: takes its costs at the pixel before, vector by vector, and leaves those here.
 class Path {
  public:
-  HWY_INLINE Path(uint8_t* costs, uint8_t least, const PathRow& row)
+  HWY_INLINE Path(uint8_t* costs, Number least, const PathRow& row)
       : costs_(costs),
-        p1_(hn::Set(kByteTag, row.p1)),
-        subtract_(hn::Set(kByteTag, least)),
-        jump_(hn::Set(kByteTag, static_cast<uint8_t>(least + row.p2))),
-        before_(hn::Set(kByteTag, 255)),
-        here_(hn::Load(kByteTag, costs)),
-        least_(before_) {}
+        ways_(least, row),
+        least_(hn::Set(kByteTag, 255)),
+        before_(least_),
+        here_(hn::Load(kByteTag, costs)) {}
 
   /// Vector j of `last` + 1 in rising order.
   HWY_INLINE Vec8 advance(int j, int last, Vec8 cost) {
-    const Vec8 after = j < last ? hn::Load(kByteTag, costs_ + (j + 1) * kByteLanes) : hn::Set(kByteTag, 255);
-    const Vec8 step = hn::SaturatedAdd(hn::Min(one_up(here_, before_), one_down(here_, after)), p1_);
-    const Vec8 way = hn::Sub(hn::Min(hn::Min(here_, step), jump_), subtract_);
+    const Costs after(j < last ? hn::Load(kByteTag, costs_ + (j + 1) * kByteLanes) : hn::Set(kByteTag, 255));
+    const Vec8 way = ways_.cheapest(here_.here, hn::Min(one_up(here_, before_), one_down(here_, after)));
     const Vec8 total = hn::SaturatedAdd(cost, way);
     hn::Store(total, kByteTag, costs_ + j * kByteLanes);
     before_ = here_;
@@ -105,11 +165,37 @@ class Path {
     least_ = hn::Min(least_, total);
     return total;
   }
-  HWY_INLINE uint8_t least() const { return smallest_lane(least_); }
+  HWY_INLINE Vec8 least() const { return least_; }  ///< its smallest lane
 
  private:
   uint8_t* costs_;
-  Vec8 p1_, subtract_, jump_, before_, here_, least_;
+  const Ways ways_;
+  Vec8 least_;
+  Costs before_, here_;
+};
+
+/// The same of the path from above, whose costs lie in memory since the row before: neighbours are loaded from beside
+/// them, where there is 255 before the first and behind the last of a pixel.
+class PathFromAbove {
+ public:
+  HWY_INLINE PathFromAbove(const uint8_t* before, uint8_t* here, Number least, const PathRow& row)
+      : before_(before), here_(here), ways_(least, row), least_(hn::Set(kByteTag, 255)) {}
+
+  HWY_INLINE Vec8 advance(int j, Vec8 cost) {
+    const uint8_t* at = before_ + j * kByteLanes;
+    const Vec8 beside = hn::Min(hn::LoadU(kByteTag, at - 1), hn::LoadU(kByteTag, at + 1));
+    const Vec8 total = hn::SaturatedAdd(cost, ways_.cheapest(hn::Load(kByteTag, at), beside));
+    hn::Store(total, kByteTag, here_ + j * kByteLanes);
+    least_ = hn::Min(least_, total);
+    return total;
+  }
+  HWY_INLINE Vec8 least() const { return least_; }
+
+ private:
+  const uint8_t* before_;
+  uint8_t* here_;
+  const Ways ways_;
+  Vec8 least_;
 };
 
 /// Hamming distances of pixel x to the pixels x - d.
@@ -154,20 +240,23 @@ class Forward {
     const int last = (kVectors > 0 ? kVectors : row_.vectors) - 1;
     const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
     const CensusCost cost(row_, x);
-    Path beside(row_.from_left, least_, row_), above(row_.above + x * stride, row_.above_least[x], row_);
+    const ptrdiff_t above_at = x * row_.above_stride;
+    Path beside(row_.from_left, least_, row_);
+    PathFromAbove above(row_.above + above_at, row_.above_here + above_at, Number::of(row_.above_least[x]), row_);
     for (int j = 0; j <= last; ++j) {
       const Vec8 c = cost.at<kOutside>(j, last);
       hn::Store(c, kByteTag, row_.costs + x * stride + j * kByteLanes);
-      hn::Store(hn::SaturatedAdd(beside.advance(j, last, c), above.advance(j, last, c)), kByteTag,
+      hn::Store(hn::SaturatedAdd(beside.advance(j, last, c), above.advance(j, c)), kByteTag,
                 row_.sums + x * stride + j * kByteLanes);
     }
-    least_ = beside.least();
-    row_.above_least[x] = above.least();
+    const Smallest smallest = smallest_lanes(beside.least(), above.least());
+    least_ = smallest.of_first;
+    row_.above_least[x] = smallest.of_second.value();
   }
 
  private:
-  const PathRow row_;  ///< a copy: stores of bytes could change the original for all that the compiler knows
-  uint8_t least_ = 0;  ///< of the path from the left
+  const PathRow row_;             ///< a copy: stores of bytes could change the original for all that the compiler knows
+  Number least_ = Number::of(0);  ///< of the path from the left
 };
 
 /// The first lane of the totals that holds the value.
@@ -199,16 +288,17 @@ class Backward {
     const int last = (kVectors > 0 ? kVectors : row_.vectors) - 1;
     const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
     Path beside(row_.from_right, least_, row_);
-    Vec8 smallest = hn::Set(kByteTag, 255);
+    Vec8 lowest = hn::Set(kByteTag, 255);
     for (int j = 0; j <= last; ++j) {
       const ptrdiff_t at = x * stride + j * kByteLanes;
       const Vec8 total = hn::SaturatedAdd(hn::Load(kByteTag, row_.sums + at),
                                           beside.advance(j, last, hn::Load(kByteTag, row_.costs + at)));
       hn::Store(total, kByteTag, row_.totals + j * kByteLanes);
-      smallest = hn::Min(smallest, total);
+      lowest = hn::Min(lowest, total);
     }
-    least_ = beside.least();
-    const uint8_t best = smallest_lane(smallest);
+    const Smallest smallest = smallest_lanes(beside.least(), lowest);
+    least_ = smallest.of_first;
+    const uint8_t best = smallest.of_second.value();
     const int d = find(row_.totals, best);
     const bool fits = row_.subpixel && d > 0 && d + 1 < row_.disparities;
     const int fraction = fits ? fraction_of(row_.totals[d - 1], best, row_.totals[d + 1]) : kNoFraction;
@@ -218,8 +308,8 @@ class Backward {
   }
 
  private:
-  const PathRow row_;  ///< see Forward
-  uint8_t least_ = 0;  ///< of the path from the right
+  const PathRow row_;             ///< see Forward
+  Number least_ = Number::of(0);  ///< of the path from the right
 };
 
 /// Pixels from .. to - 1 of the one, and of the other as many from the right. Each waits for its own pixel before most

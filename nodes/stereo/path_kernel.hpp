@@ -26,9 +26,14 @@ struct PathRow {
 
   // `vectors` vectors for each pixel.
   uint8_t* costs = nullptr;        ///< matching costs
-  uint8_t* above = nullptr;        ///< in: the path from above at the row before (zero at the first); out: at this row
   uint8_t* above_least = nullptr;  ///< its minima, a byte a pixel
   uint8_t* sums = nullptr;         ///< paths from the left and from above
+
+  // The path from above at the row before (zero at the first) and, out, at this row. Of a pixel as many bytes as
+  // `vectors` have and, if the search range fills them, a vector more of 255; before the first pixel is 255, too.
+  const uint8_t* above = nullptr;
+  uint8_t* above_here = nullptr;
+  ptrdiff_t above_stride = 0;
 
   // Scratch, one pixel each.
   uint8_t *from_left = nullptr, *from_right = nullptr, *totals = nullptr;
@@ -43,7 +48,7 @@ struct PathKernels {
   const char* target;
   int lanes;  ///< bytes of a vector
   /// Paths from the left and from above along the next row, and the one from the right with the winners along the row
-  /// before, which must have been `next` already; null: none. The two share `above` and nothing else that is written.
+  /// before, which must have been `next` already; null: none. Neither reads what the other writes.
   void (*run_rows)(const PathRow* next, const PathRow* finished);
 };
 

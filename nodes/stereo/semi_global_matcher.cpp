@@ -26,9 +26,9 @@ struct SemiGlobalMatcher::State {
   const PathKernels* kernels;
   PlaneMaker maker;
   Planes left, right_mirrored;
-  Buffer<uint8_t> outside, beyond, above, above_least, from_left, from_right, totals;
-  std::array<Buffer<uint8_t>, 2> costs, sums;   ///< of even and odd rows
-  Rows<int16_t> left_fine, right_fine, smooth;  ///< the right one's columns are reversed
+  Buffer<uint8_t> outside, beyond, above_least, from_left, from_right, totals;
+  std::array<Buffer<uint8_t>, 2> costs, sums, above;  ///< of even and odd rows
+  Rows<int16_t> left_fine, right_fine, smooth;        ///< the right one's columns are reversed
   Rows<uint8_t> least, ambiguous;
   std::array<uint8_t, 256> confidences{};  ///< of a sum of three paths
 };
@@ -52,7 +52,9 @@ SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const Ma
   set_range(p.disparities);
   for (auto* volume : {&costs, &sums})
     for (Buffer<uint8_t>& row : *volume) row = Buffer<uint8_t>(size(width) * size(depth));
-  above = Buffer<uint8_t>(size(width) * size(depth));
+  const int above_depth = round_up(p.disparities + 1, kernels->lanes);
+  for (Buffer<uint8_t>& row : above)  // neighbours of the first and of the last pixel are read, too
+    row = Buffer<uint8_t>(size(2 * kernels->lanes) + size(width) * size(above_depth));
   above_least = Buffer<uint8_t>(size(width));
   for (Buffer<uint8_t>* pixel : {&from_left, &from_right, &totals}) *pixel = Buffer<uint8_t>(size(depth));
   left_fine = Rows<int16_t>(height, width);
@@ -77,7 +79,10 @@ void SemiGlobalMatcher::State::set_range(int disparities) {
 
 void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mirrored_other,
                                       const Rows<int16_t>& fine) {
-  above.fill(0);
+  const int above_stride = round_up(p.disparities + 1, kernels->lanes);
+  for (Buffer<uint8_t>& row : above) row.fill(255);
+  for (int x = 0; x < width; ++x)
+    std::memset(above[1].data() + kernels->lanes + x * above_stride, 0, static_cast<size_t>(p.disparities));
   above_least.fill(0);
   PathRow row;
   row.width = width;
@@ -90,7 +95,7 @@ void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mir
   row.subpixel = p.subpixel;
   row.outside = outside.data();
   row.beyond = beyond.data();
-  row.above = above.data();
+  row.above_stride = above_stride;
   row.above_least = above_least.data();
   row.from_left = from_left.data();
   row.from_right = from_right.data();
@@ -99,6 +104,8 @@ void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mir
   for (int y = 0; y < height; ++y) {
     row.costs = costs[static_cast<size_t>(y % 2)].data();
     row.sums = sums[static_cast<size_t>(y % 2)].data();
+    row.above = above[static_cast<size_t>((y + 1) % 2)].data() + kernels->lanes;
+    row.above_here = above[static_cast<size_t>(y % 2)].data() + kernels->lanes;
     for (int i = 0; i < maker.count(); ++i) {
       row.left[i] = reference[static_cast<size_t>(i)].row(y);
       row.right[i] = mirrored_other[static_cast<size_t>(i)].row(y);
