@@ -14,6 +14,7 @@
 #include "graph/cli/outcome.hpp"
 #include "graph/machines/way.hpp"
 #include "hal/dds/socket_buffer.hpp"
+#include "nodes/cuda/card_check.hpp"
 #include "rt/machine/checks.hpp"
 #include "rt/machine/measure.hpp"
 #include "rt/machine/parse.hpp"
@@ -104,7 +105,8 @@ int run_doctor(const DoctorOptions& options) {
     }
   const machine::SystemFacts facts;
   const auto identity = machine::Identity::of(facts);
-  const auto findings = machine::examine(facts, machine::try_machine());
+  auto findings = machine::examine(facts, machine::try_machine());
+  findings.push_back(cuda::check_card());
   auto json = graph::doctor_json(identity, findings);
   if (!options.json) std::fputs(graph::doctor_text(identity, findings).c_str(), stdout);
   std::string refused;

@@ -39,7 +39,7 @@ class CudaCooccurrences {
   CudaCooccurrences& operator=(const CudaCooccurrences&) = delete;
 
   /// False if the card was not asked, or not in time: missing() has nothing then. `bgr`: three channels, of the grid's
-  /// image size; `questions`: each at most once.
+  /// image size; `questions`: each at most once. None at all is for a thread's first time: CUDA allocates then.
   [[nodiscard]] bool find(ImageView<const uint8_t> bgr, std::span<const WindowOfObject> questions);
   /// There is nothing any more.
   void forget();

@@ -50,7 +50,11 @@ bool Detector::begin(ImageView<const uint8_t> bgr, const MaskSums* mask) {
   image_ = bgr;
   mask_ = mask;
   searched_rows_ = searched_windows_ = 0;
-  for (ScaleSearch& scale : scales_) scale.clear();
+  for (ScaleSearch& scale : scales_) {
+    scale.clear();
+    if (!met_card_) scale.meet_card(bgr);
+  }
+  met_card_ = true;
   return true;
 }
 

@@ -120,6 +120,7 @@ class Detector {
   ImageView<const uint8_t> image_;
   const MaskSums* mask_ = nullptr;
   size_t first_row_ = 0, searched_rows_ = 0, searched_windows_ = 0;
+  bool met_card_ = false;                        ///< in a job
   std::vector<Candidate> candidates_;            ///< a heap, the best in front
   std::vector<WindowOfObject> at_one_scale_;     ///< of these
   std::string refused_;                          ///< why there is no card

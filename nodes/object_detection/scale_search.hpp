@@ -47,6 +47,10 @@ class ScaleSearch {
   /// order, each at most once.
   void will_decide(std::span<const WindowOfObject> windows);
 
+  /// In the first job, in which what a card allocates is forgiven. `bgr`: no smaller than the scaled image.
+  void meet_card(ImageView<const uint8_t> bgr) {
+    if (cooccurrence_) cooccurrence_->count_ahead(bgr, {});
+  }
   /// The stage of co-occurrences, which has a twin on a card; null without it.
   CooccurrenceStage* cooccurrence() { return cooccurrence_ ? &*cooccurrence_ : nullptr; }
 

@@ -22,7 +22,7 @@ import json, sys
 report = json.load(open(sys.argv[1]))
 wanted = {"sched_deadline", "deadline_bandwidth", "sched_fifo", "rt_runtime", "cgroup_rt", "fair_server", "mlockall", "dev_shm", "swap", "tick",
           "transparent_hugepage", "cpu_dma_latency", "timer_slack", "preemption", "clocksource", "governor", "cpusets",
-          "irq_affinity", "host_stall", "iceoryx", "rights", "watchdog"}
+          "irq_affinity", "host_stall", "iceoryx", "rights", "watchdog", "cuda"}
 assert {c["name"] for c in report["checks"]} == wanted, wanted ^ {c["name"] for c in report["checks"]}
 for check in report["checks"]:
     assert check["status"] in ("ok", "warn", "lacks", "unknown") and check["found"] and check["meaning"], check

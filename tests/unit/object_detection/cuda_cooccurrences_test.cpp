@@ -130,6 +130,7 @@ TEST_CASE("object_detection: with a card the same is found, and all windows of a
   {
     TwoDetectors two;
     CHECK(pair_cards == 2);
+    CHECK(two.calls_for(1) == 2 + 2);  // each scale meets it first
     CHECK(two.calls_for(1) == 2);
     CHECK(pair_questions > 0);
     CHECK(two.calls_for(2) == 2);
@@ -140,6 +141,7 @@ TEST_CASE("object_detection: with a card the same is found, and all windows of a
 
 TEST_CASE("object_detection: what a card is late with or fails to count the CPU counts") {
   TwoDetectors two;
+  two.calls_for(1);
   outcome_of_pairs = cuda::Outcome::late;
   CHECK(two.calls_for(1) == 2);
   CHECK(two.with_card.trouble() == "a shim was later than 1500 us");
