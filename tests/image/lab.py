@@ -12,11 +12,19 @@ sys.dont_write_bytecode = True
 
 from takt_image import bundle, qemu, tools  # noqa: E402
 
-BAD = {
+# Releases that are not good, and some that differ: files over those of a good one.
+OTHER = {
     "refuses": {"etc/takt/machine/refuses": "a test\n"},
     "panics": {"usr/sbin/init": "#!/bin/sh\nmount -t proc proc /proc\necho c >/proc/sysrq-trigger\n"},
     "hangs": {"usr/sbin/init": "#!/bin/sh\nwhile :; do sleep 1000; done\n"},
 }
+
+
+MIGRATION = "keep kept fresh\nsed -i 's/^/new /' kept\necho 1 >fresh\n"
+NEWER = {"usr/share/takt/image/data_version": "2\n", "usr/share/takt/image/migrate/1": MIGRATION}
+OTHER["migrates"] = NEWER
+OTHER["migrates_refuses"] = {**NEWER, **OTHER["refuses"]}
+OTHER["migration_fails"] = {**NEWER, "usr/share/takt/image/migrate/1": MIGRATION + "echo 'no room' >&2\nfalse\n"}
 
 
 class Lab:
@@ -32,15 +40,15 @@ class Lab:
             bundle.make_keys(folder)
         return folder
 
-    def build(self, version, bad=None, keys=None, slot=None):
-        """The folder of a release: takt.img, takt.raucb, system.img. `bad`: a kind of BAD."""
+    def build(self, version, other=None, keys=None, slot=None):
+        """The folder of a release: takt.img, takt.raucb, system.img. `other`: a kind of OTHER."""
         out = self.folder / f"release-{version}"
         if (out / "takt.raucb").exists():
             return out
         overlay = self.folder / "overlay"
         shutil.rmtree(overlay, ignore_errors=True)
         shutil.copytree(ROOT / "tests/image/guest", overlay, symlinks=True)
-        for path, text in BAD.get(bad, {}).items():
+        for path, text in OTHER.get(other, {}).items():
             (overlay / path).parent.mkdir(parents=True, exist_ok=True)
             (overlay / path).write_text(text)
             (overlay / path).chmod(0o755)

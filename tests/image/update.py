@@ -5,7 +5,8 @@
     refused    damaged, truncated, wrongly signed and older bundles are refused, and change nothing; so is one while the robot may move
     good       N good updates in a row, from slot to slot
     refuses    a release whose self-test fails; panics, hangs: one whose kernel panics, that never starts systemd
-    torn       GRUB's variables are torn; an update succeeds all the same
+    torn       GRUB's variables are torn while the first slot is half written; both they and their copy are; an update succeeds all the same
+    migrates   a release that brings the data forward; afterwards one of the old data is refused. Two that fail at it: the data are as before
     cuts       the power goes at N random instants of install, restart and self-test
 
 Behind each bad one a good release runs after at most two boots, data are intact, and a further update succeeds. Exit 1: something is not as it
@@ -131,18 +132,45 @@ class Test:
 
     def bad(self, kind):
         machine = self.machine()
-        said, why, boots = updated(machine, self.stick(kind, bad=kind))
+        said, why, boots = updated(machine, self.stick(kind, other=kind))
         self.check(said["release"] == "1" and boots <= 2, f"{kind}: back at release {said['release']} after {boots} boots ({why or 'it never ran'})")
         said, _, _ = updated(machine, self.stick("2"))
         self.check(said["release"] == "2", f"{kind}: a further update gives release {said['release']}")
 
     def torn(self):
         machine = self.machine()
+        said, _, _ = updated(machine, self.stick("2"))  # from here on slot B runs
+        for name, damage in (("torn", ": >/boot/efi/grub/grubenv"), ("torn, and its copy", ": >/boot/efi/grub/grubenv; : >/boot/efi/grub/grubenv.copy")):
+            with machine.boot() as guest:
+                ready(guest)
+                guest.ask(f"dd if=/dev/zero of=/dev/disk/by-partlabel/system-a bs=1M count=64 conv=notrunc; {damage}; sync")
+            with machine.boot() as guest:
+                said, boots = ready(guest)
+                self.check(said["slot"] == "B" and boots <= 2, f"{name}: slot {said['slot']} runs after {boots} boots, slot A has no kernel")
+                guest.ask("sync; systemctl --no-block poweroff")
+                guest.read(20)
+        said, _, _ = updated(machine, self.stick("3"))
+        self.check(said["release"] == "3" and said["slot"] == "A", f"torn: release {said['release']} in slot {said['slot']} after an update")
+
+    def data(self, guest):
+        text, _ = guest.ask("cat /var/lib/takt/kept /var/lib/takt/fresh /var/lib/takt/machine/data_version 2>/dev/null; ls -d /var/lib/takt/machine/before 2>/dev/null")
+        return " ".join(text.split())
+
+    def migrates(self):
+        machine = self.machine()
         with machine.boot() as guest:
             ready(guest)
-            guest.ask(": >/boot/efi/grub/grubenv; sync")
-        said, _, _ = updated(machine, self.stick("2"))
-        self.check(said["release"] == "2", f"torn: release {said['release']} after an update")
+            guest.ask("echo data >/var/lib/takt/kept; sync")
+        for kind, ends, there in (("migrates_refuses", "1", "data 1"), ("migration_fails", "1", "data 1"), ("migrates", "migrates", "new data 1 2")):
+            said, why, _ = updated(machine, self.stick(kind, other=kind))
+            with machine.boot() as guest:
+                ready(guest)
+                now = self.data(guest)
+                guest.ask("sync; systemctl --no-block poweroff")
+                guest.read(20)
+            self.check(said["release"] == ends and now == there, f"{kind}: release {said['release']} runs, data: {now} ({why or 'good'})")
+        said, why, _ = updated(machine, self.stick("2"))
+        self.check(said["release"] == "migrates" and "later release" in why, f"back to data of version 1: release {said['release']} runs ({why})")
 
     def cuts(self):
         chance = random.Random(self.options.seed)
@@ -182,7 +210,7 @@ def main():
         try:
             test = Test(options, options.work or pathlib.Path(temporary))
             for name, part in (("refused", test.refused), ("good", test.good), ("refuses", lambda: test.bad("refuses")), ("panics", lambda: test.bad("panics")),
-                               ("hangs", lambda: test.bad("hangs")), ("torn", test.torn), ("cuts", test.cuts)):
+                               ("hangs", lambda: test.bad("hangs")), ("torn", test.torn), ("migrates", test.migrates), ("cuts", test.cuts)):
                 if options.only and name not in options.only:
                     continue
                 began = time.monotonic()

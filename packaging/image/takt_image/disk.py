@@ -96,7 +96,7 @@ def make_esp(folder, kernel_arguments):
     fixed = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the first time that FAT has
     tools.run("mmd", "-i", esp, "::EFI", "::EFI/BOOT", "::grub", env=fixed)
     for source, place in ((efi, "EFI/BOOT/BOOTX64.EFI"), (HERE / "grub/grub.cfg", "grub/grub.cfg"), (folder / "machine.cfg", "grub/machine.cfg"),
-                          (folder / "grubenv", "grub/grubenv")):
+                          (folder / "grubenv", "grub/grubenv"), (folder / "grubenv", "grub/grubenv.copy")):
         tools.run("mcopy", "-i", esp, source, f"::{place}", env=fixed)
     return esp
 

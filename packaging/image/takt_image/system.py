@@ -11,7 +11,8 @@ from . import tools
 
 HERE = pathlib.Path(__file__).resolve().parents[1]
 UNITS = ("takt-first-boot.service", "systemd-networkd.service", "systemd-resolved.service", "systemd-timesyncd.service")
-# Of what a release leaves in /var: later ones read it, earlier ones refuse it.
+# Of what a release leaves in /var: earlier ones refuse it. Whoever raises it adds files/usr/share/takt/image/migrate/OLD, a
+# piece of shell that brings /var/lib/takt from there one version further (README.md).
 DATA_VERSION = 1
 SSHD = """# Keys only, as root, no password anywhere.
 HostKey /var/lib/takt/machine/ssh_host_ed25519_key
