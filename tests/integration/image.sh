@@ -46,6 +46,36 @@ large=$(losetup --find --show "$work/large.raw" 2>/dev/null) && small=$(losetup 
   expect 2 "system.xz is damaged" "$takt" image write "$work/system.xz" "$large" --yes
 } || echo "NOT RUN: losetup makes no disk here"
 for device in $large $small; do losetup --detach "$device"; done
+# Data of an earlier release are brought forward, and come back where that does not end well; those of a later one are refused.
+machine=$work/machine_scripts
+mkdir -p "$machine" "$work/share/migrate" "$work/data/machine"
+for script in common data; do
+  sed "s#/usr/libexec/takt/machine#$machine#g; s#/var/lib/takt#$work/data#g; s#/usr/share/takt/image#$work/share#g" \
+    "$source/packaging/image/files/usr/libexec/takt/machine/$script" >"$machine/$script"
+done
+holds() { # KEPT FRESH: what lies there
+  [ "$(cat "$work/data/maps/kept")" = "$1" ] || fail "kept is '$(cat "$work/data/maps/kept")', not '$1'"
+  [ "$(cat "$work/data/fresh" 2>/dev/null)" = "$2" ] || fail "fresh is '$(cat "$work/data/fresh" 2>/dev/null)', not '$2'"
+}
+mkdir "$work/data/maps"
+echo old >"$work/data/maps/kept"
+echo 1 >"$work/data/machine/data_version"
+echo 3 >"$work/share/data_version"
+printf '%s\n' 'keep maps/kept fresh' "sed -i 's/^/new /' maps/kept" 'echo 1 >fresh' >"$work/share/migrate/1"
+printf '%s\n' 'keep maps/kept' "sed -i 's/^/newer /' maps/kept" "echo 'no room' >&2" false 'echo after' >"$work/share/migrate/2"
+expect 1 "the migration of data of version 2: no room" sh -c "sh $machine/data >&2"
+holds old ""
+sed -i /false/d "$work/share/migrate/2"
+expect 0 "the data of version 2 are brought to 3" sh -c "sh $machine/data >&2"
+holds "newer new old" 1
+expect 0 "the data of version 1 are brought to 2" sh -c "sh $machine/data >&2"  # nobody has said that the release is good
+holds "newer new old" 1
+echo 1 >"$work/share/data_version"
+expect 0 "" sh -c "sh $machine/data >&2"  # back at the old release
+holds old ""
+echo 2 >"$work/data/machine/data_version"
+expect 1 "the data are of version 2, of a later release; this one reads 1" sh -c "sh $machine/data >&2"
+
 if disk first 2>"$work/stderr"; then
   sleep 3  # FAT counts time in steps of two seconds
   disk second
