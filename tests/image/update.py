@@ -43,7 +43,8 @@ def ready(guest, since=0):
     """Waits, from line `since` on, until a release has been judged good; what it is, and after how many boots."""
     number, _ = guest.wait_for(r"release \S+ in slot \S is good", 2 * GOOD_S, since)
     guest.connection = None  # a shell of an earlier boot
-    boots = sum("takt: slot" in line for _, line in guest.lines[since:number])
+    said = [line for _, line in guest.lines[since:number] if "takt: slot" in line]
+    boots = len(said) - 2 * sum("cannot be loaded" in line for line in said)  # that slot was said twice, and did not boot
     return settled(guest), boots
 
 
