@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parameters of a node that has a twin on a card.
 //
-//   cuda::Accelerator accelerator_{this};                       // a member of the node
-//   accelerator_.take([&](const cuda::CardUse& use) { detector_->use(use); }, [&] { return
-//   detector_->card_is_quicker(); }); accelerator_.tell(job, "counts", detector_->trouble());     // at the end of a
-//   job
+//   cuda::Accelerator accelerator_{this};                                  // a member of the node
+//   const auto card = accelerator_.take([&](const cuda::CardUse& use) { detector_->use(use); },  // in setup()
+//                                       [&] { return detector_->card_is_quicker(setup.clock); });
+//   accelerator_.tell(job, "counts", detector_->trouble());                // at the end of a job
 #pragma once
 #include <optional>
 #include <stdexcept>
@@ -49,7 +49,7 @@ class Accelerator {
   }
 
   /// Says in the log, once, that the CPU does it and why, and that the card does it again. `verb`: "matches";
-  /// `trouble`: empty, or why; it lives until the next call.
+  /// `trouble`: empty, or why.
   void tell(Job& job, const char* verb, std::string_view trouble) {
     if (trouble.substr(0, told_.capacity()) == told_) return;
     told_.assign(trouble.substr(0, told_.capacity()));

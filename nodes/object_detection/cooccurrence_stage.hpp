@@ -25,6 +25,7 @@ class CooccurrenceStage {
   /// From now on count_ahead() asks a card. Takes 0.2 s. Throws std::runtime_error if it refuses.
   void use(const cuda::CardUse& card);
   void leave_card() { card_.reset(); }
+  bool uses_card() const { return card_ != nullptr; }
   std::span<const PairReferences> references() const { return objects_; }
   /// Whether the card, which there must be, counts faster in some windows of noise than the CPU, by that clock.
   bool card_is_quicker(const Clock& clock);

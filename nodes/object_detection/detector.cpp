@@ -35,7 +35,6 @@ Detector::Detector(int image_width, int image_height, std::span<const DatabaseOb
     windows_ += undecided_.back().size();
   }
   if (last_ >= Stage::cooccurrence) candidates_.reserve(windows_ * database.size());
-  if (last_ >= Stage::cooccurrence) at_one_scale_.reserve(windows_ * database.size());
   for (size_t entry = 0; entry < database.size(); ++entry) class_ids_.push_back(static_cast<float>(entry));
   for (const DatabaseObject& object : database)
     first_of_name_.push_back(static_cast<size_t>(
@@ -85,6 +84,7 @@ void Detector::gather_candidates() {
 /// All of them, though there may not be time for all: a card takes not much longer for more.
 void Detector::announce_candidates() {
   for (uint32_t s = 0; s < scales_.size(); ++s) {
+    if (scales_[s].cooccurrence() == nullptr || !scales_[s].cooccurrence()->uses_card()) continue;
     at_one_scale_.clear();
     for (const Candidate& candidate : candidates_)
       if (candidate.scale == s) at_one_scale_.push_back({candidate.window, candidate.object});
@@ -93,6 +93,7 @@ void Detector::announce_candidates() {
 }
 
 void Detector::use(const cuda::CardUse& card) {
+  at_one_scale_.reserve(candidates_.capacity());
   for (ScaleSearch& scale : scales_) {
     if (scale.cooccurrence() == nullptr)
       throw std::invalid_argument(

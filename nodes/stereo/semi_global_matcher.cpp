@@ -16,6 +16,8 @@ struct SemiGlobalMatcher::State {
   State(int width_, int height_, int channels_, const MatcherParameters& parameters);
   void set_range(int disparities);
   void price_steps();
+  /// Bytes of a pixel of `above`.
+  int above_stride() const { return round_up(p.disparities + 1, kernels->lanes); }
   void search(const Planes& reference, const Planes& mirrored_other, const Rows<int16_t>& fine);
   void write(int y, const DisparityViews& out) const;
 
@@ -52,9 +54,8 @@ SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const Ma
   set_range(p.disparities);
   for (auto* volume : {&costs, &sums})
     for (Buffer<uint8_t>& row : *volume) row = Buffer<uint8_t>(size(width) * size(depth));
-  const int above_depth = round_up(p.disparities + 1, kernels->lanes);
   for (Buffer<uint8_t>& row : above)  // neighbours of the first and of the last pixel are read, too
-    row = Buffer<uint8_t>(size(2 * kernels->lanes) + size(width) * size(above_depth));
+    row = Buffer<uint8_t>(size(2 * kernels->lanes) + size(width) * size(above_stride()));
   above_least = Buffer<uint8_t>(size(width));
   for (Buffer<uint8_t>* pixel : {&from_left, &from_right, &totals}) *pixel = Buffer<uint8_t>(size(depth));
   left_fine = Rows<int16_t>(height, width);
@@ -79,10 +80,9 @@ void SemiGlobalMatcher::State::set_range(int disparities) {
 
 void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mirrored_other,
                                       const Rows<int16_t>& fine) {
-  const int above_stride = round_up(p.disparities + 1, kernels->lanes);
   for (Buffer<uint8_t>& row : above) row.fill(255);
   for (int x = 0; x < width; ++x)
-    std::memset(above[1].data() + kernels->lanes + x * above_stride, 0, static_cast<size_t>(p.disparities));
+    std::memset(above[1].data() + kernels->lanes + x * above_stride(), 0, static_cast<size_t>(p.disparities));
   above_least.fill(0);
   PathRow row;
   row.width = width;
@@ -95,7 +95,7 @@ void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mir
   row.subpixel = p.subpixel;
   row.outside = outside.data();
   row.beyond = beyond.data();
-  row.above_stride = above_stride;
+  row.above_stride = above_stride();
   row.above_least = above_least.data();
   row.from_left = from_left.data();
   row.from_right = from_right.data();
